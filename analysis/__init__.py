@@ -35,9 +35,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
     from .motion.one_sided import OneSidedMotion, one_sided_motion
-    from .motion.pushes import OneSidedOutcome
     from .motion.random_state import fastest_growing
-    from .motion.rising_load import RisingMotion
     from .motion.spectrum import (
         Spectrum,
         discrete_frequency,
@@ -68,8 +66,8 @@ if TYPE_CHECKING:  # each is imported when it is used
 __all__ = [
     "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "ElasticModuli",
     "FaultgougeError", "Floats", "Growth", "Indices", "Linear", "LinearisedContacts", "LostEnergy", "Material",
-    "MindlinLaw", "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome",
-    "Onset", "OnsetError", "OutputError", "Packing", "PackingFileError", "PlaneWave", "PowerLaw", "RisingMotion",
+    "MindlinLaw", "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion",
+    "Onset", "OnsetError", "OutputError", "Packing", "PackingFileError", "PlaneWave", "PowerLaw",
     "RunFile", "Signal", "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Window",
     "closest_to_meeting", "complex_windows", "damping_matrix", "discrete_frequency", "dispersion", "dynamical_matrix",
     "eigenvalues", "elastic_moduli", "fastest_growing", "find_onset", "fit_growth", "fit_power_law", "growth_of_run",

@@ -1,25 +1,20 @@
 """Results whose numbers have two spellings: that of Python, and that of their JSON."""
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 
-class FieldsByName(Mapping[str, Any]):
-    """A dataclass whose fields are attributes and items: `found.time` is `found["time"]`."""
+class FieldsByName(dict[str, Any]):
+    """Numbers by name: `found.time` is `found["time"]`."""
 
-    def __getitem__(self, name: str) -> Any:
-        return vars(self)[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(vars(self))
-
-    def __len__(self) -> int:
-        return len(vars(self))
+    def __getattr__(self, name: str) -> Any:
+        if name not in self:
+            raise AttributeError(f"there is no {name!r}: {', '.join(self)}")
+        return self[name]
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields as JSON has them: None for a number that is not finite, such as a scale without a bound."""
+        """The numbers as JSON has them: None for one that is not finite, such as a scale without a bound."""
         return {name: _plain(value) for name, value in self.items()}
 
 

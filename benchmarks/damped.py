@@ -43,7 +43,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
-from faultgouge.analysis.motion.motion import EnergyNorm
+from faultgouge.analysis.motion.motion import energy_norm, matrix_in_norm
 from faultgouge.analysis.windows import System, find_windows
 from faultgouge.analysis.windows.search import Search
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
@@ -133,7 +133,7 @@ def against_all_eigenvalues(
     def fastest(fx: float) -> float:
         place = system(fx)
         a, g = place.stiffness.toarray(), place.damping.toarray()
-        return float(eigvals(EnergyNorm.of(a).first_order(a, g)).real.max())
+        return float(eigvals(matrix_in_norm(energy_norm(a), a, g)).real.max())
 
     def largest(loads: Iterable[float]) -> float:
         return max(map(fastest, loads), default=-np.inf)

@@ -10,8 +10,7 @@ Memory is the peak of all stages before the onsets, and of all.
     solve      of K dq = F, factorisation included
     largest    eigenvalue of K, for the time step of an undamped run
     undamped   1000 steps of such a run
-    part       the first window among 600 modes, those from the 0.6 N-th on, the ramp to it included
-    onset      the first window of all modes, the same way; not with --no-onset, and hours for 100,000 disks
+    onset      the first window, the ramp to it included; not with --no-onset, and hours for 100,000 disks
     file       run.h5, for each equilibrium
 
 Beside these, square crystals of disks, whose equilibria are known and need no settling.
@@ -48,10 +47,6 @@ from faultgouge.pywrap.runs.undamped import time_step
 
 Row = dict[str, float | int | None]
 
-PART, FROM = 600, 0.6
-"""Modes among which the onset of every size is sought, and the first of them, in units of N: a fifth of the spectrum
-lies below, whatever the size."""
-
 INCREMENTS = 50
 """Number of increments, each of 2/N: the first onset falls somewhat faster than 2/N, and contacts change as often in an
 increment."""
@@ -78,8 +73,6 @@ def measured(disks: int, seed: int, with_onset: bool) -> Row:
     row: Row = {"disks": disks, "settle": time.perf_counter() - begin}
     with Engine(start.packing) as engine:
         row |= increments(engine, start) | undamped(engine, start) | {"memory": peak()}
-        first = round(FROM * disks)
-        row["part"], row["fx_part"] = onset(engine, start, wanted, (first, first + PART))
         if with_onset:
             row["onset"], row["fx_c"] = onset(engine, start, wanted)
     return row | {"in all": peak()}
@@ -153,14 +146,12 @@ def undamped(engine: Engine, start: Equilibrium) -> dict[str, float]:
         return {"largest": known - begin, "undamped": time.perf_counter() - ready}
 
 
-def onset(
-    engine: Engine, start: Equilibrium, wanted: Scene, modes: tuple[int, int] | None = None
-) -> tuple[float, float | None]:
+def onset(engine: Engine, start: Equilibrium, wanted: Scene) -> tuple[float, float | None]:
     """Time to the first window, and where it opens; None if the packing flows, or is stable to the ramp's end."""
     begin = time.perf_counter()
     path = scene_path(engine, start, wanted)
     try:
-        fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing), modes=modes).fx_c
+        fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing)).fx_c
     except (NoEquilibriumError, OnsetError):
         fx_c = None
     return time.perf_counter() - begin, fx_c
@@ -186,13 +177,13 @@ def main() -> None:
     table("crystals", options.crystals, ["--crystals", "1"])
 
 
-COLUMNS = ("disks", "settle", "newton", "assembly", "solve", "largest", "undamped", "file", "memory", "part", "onset")
+COLUMNS = ("disks", "settle", "newton", "assembly", "solve", "largest", "undamped", "file", "memory", "onset")
 """Columns of the table; beside them stand the memory in all and the onsets."""
 
 
 def table(title: str, sizes: list[int], arguments: list[str]) -> None:
     """Measure packings of several sizes, each in a process of its own, and print them."""
-    columns = (*COLUMNS, "in all", "fx_part", "fx_c")
+    columns = (*COLUMNS, "in all", "fx_c")
     print(f"\n{title}; s, memory in GB, file in MB\n" + "".join(f"{name:>11s}" for name in columns))
     rows: list[Row] = []
     for disks in sizes:

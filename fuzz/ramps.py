@@ -176,7 +176,7 @@ def _compare_ramps(climb: RampRun, reference: RampRun) -> Row:
 
 def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
     """The rows of packings, from the file or else computed and appended to the file."""
-    known = {row["draw"]: row for row in read_keyed_rows(path, "draw", "python -m fuzz.ramps")}
+    known = {row["draw"]: row for row in read_keyed_rows(path, ("draw",), "python -m fuzz.ramps")}
     yield from known.values()
     missing = [number for number in range(packings) if number not in known]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:

@@ -14,9 +14,8 @@ from mpi4py import MPI
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ..analysis.arrays import Floats
 from ..analysis.errors import FaultgougeError, TurningPointError
-from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
-from ..analysis.windows import NoGrowthError, Ranks, full_operator, takes_all_modes
+from ..analysis.windows import NoGrowthError, Ranks, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
 from .load_path import LoadPath
@@ -26,9 +25,6 @@ from .runs.scene_path import scene_path
 from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
-
-OnsetSoFar = Callable[[Onset, float], None]
-"""Takes what is known, without the errors of the path, and the load up to which that is all."""
 
 ONSET_DISTANCES = np.concatenate(
     [
@@ -90,10 +86,8 @@ def onset_run(
     *,
     dissipation: bool = False,
     first: bool = False,
-    modes: tuple[int, int] | None = None,
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
-    known: OnsetSoFar = lambda found, fx: None,
     bed: Packing | None = None,
     watch: Watch | None = None,
     folder: Path | None = None,
@@ -114,14 +108,10 @@ def onset_run(
         Whether the dashpots and the drag of the section [damping] count; the onset without them is found as well.
     first : bool
         Seek the first window alone, as of a large packing.
-    modes : tuple of (int, int), optional
-        Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
     reached : callable, optional
         Called with each equilibrium of the ramp.
     near_onset : ndarray, optional
         Distances from F_x^c, force, at which equilibria are also computed: `between` of the result.
-    known : callable, optional
-        Of a search with dissipation: called as soon as there is a window, and after each increment from there on.
     bed : Packing, optional
         As in :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
@@ -133,7 +123,7 @@ def onset_run(
     Raises
     ------
     SceneError
-        If the scene has no section [ramp], or the packing has none of the modes.
+        If the scene has no section [ramp].
     OnsetError
         If no motion grows up to the ramp's end; a NoGrowthError, if there is an onset without dissipation.
     NoEquilibriumError
@@ -145,9 +135,6 @@ def onset_run(
     scene = scene.model_copy(update={"damping": None})
     with show_progress(watch, "settling: "):
         start = settle(scene, mu, bed=bed)
-    count = len(active_coordinates(full_operator(start.packing)))
-    if modes is not None and modes[0] >= count:
-        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
     if reached is not None:
         reached(start)
 
@@ -157,7 +144,7 @@ def onset_run(
 
     with show_progress(watch), Engine(start.packing) as engine:
         path, forces = scene_path(engine, start, scene, onward=True), wanted
-        if reached is not None or (takes_all_modes(start.packing, modes) and not first):
+        if reached is not None or (takes_all_modes(start.packing) and not first):
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for equilibrium in path.climb(wanted[1:]):
                 if reached is not None:
@@ -165,7 +152,7 @@ def onset_run(
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
         at = path if damping is None else lambda fx: with_dashpots(path(fx))
-        search = partial(find_onset, dissipation=dissipation, modes=modes, first=first, known=known, folder=folder)
+        search = partial(find_onset, dissipation=dissipation, first=first, folder=folder)
         try:
             found = search(at, forces, ranks=search_ranks())
         except TurningPointError:

@@ -36,12 +36,11 @@ from ..analysis.arrays import Floats
 from ..analysis.counted import counted
 from ..analysis.responses.growth import NOISE_FACTOR
 from ..analysis.responses.growth_of_run import unstable_rates
-from ..pywrap import Engine, Scene, SceneError
+from ..pywrap import Engine, Equilibrium, Scene, SceneError
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
 from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.validation import FORCE, TIME, Positive, Section, require_section
-from ..pywrap.settling.settle import settle
 from .packing_tools import contact_pairs, path_from, unit_of_time
 from .result_rows import Row, Rows, row_columns
 from .study import Figures, Result, Work, study
@@ -118,14 +117,11 @@ class StartOfRun(NamedTuple):
         Its largest force on a disk: contacts that carry less do not count.
     time : float
         Length of the run at the most, time.
-    damped : bool
-        Whether the packing has dashpots or drag.
     """
 
     packing: Packing
     residual: float
     time: float
-    damped: bool = False
 
 
 def growth_rate(packing: Packing) -> float:
@@ -184,22 +180,23 @@ def erupt(start: StartOfRun) -> Row:
             ended_motion, work = dynamics.work(WORK_STEPS)
             after = ended_motion.kinetic_energy(packing)
     columns = dict(zip((*AMOUNTS, *COUNTS), np.transpose(samples), strict=True))
+    series = {name: column.astype(int if name in COUNTS else float).tolist() for name, column in columns.items()}
     time, msds = columns["time"], columns["msd"]
-    noise = float(msds[time <= unit].max(initial=float(msds[0])))
+    noise, ended = float(msds[time <= unit].max(initial=float(msds[0]))), None
     walk = WALK_FACTOR * packing.coordinate_rounding**2 * time[-1] / dt
-    ended, ends = None, "stable" if msds.max() <= max(RISE_OF_D * noise, walk) else "rises"
+    ends = "stable" if msds.max() <= max(RISE_OF_D * noise, walk) else "rises"
     if rate > 0:
         place = int(np.argmax(msds >= END_OF_GROWTH * msds.max()))
-        ended, upto = float(time[place]), slice(0, place + 1)
-        ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
+        opened, slides = (columns[name][: place + 1].any() for name in ("lost", "sliding"))
+        ended, ends = float(time[place]), "opens" if opened else "slides" if slides else "law"
         ends = ends if over else "cut off"
-    known = {"fx": packing.fx, "damped": start.damped, "rate": rate, "time": float(time[-1])}
-    most = {name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")}
-    contacts = {name: int(columns[name].max()) for name in COUNTS}
-    balance = float(abs(after - before - work) / max(abs(work), after, before))
-    how = {"ended": ended, "ends": "flows" if flows else ends, "noise": noise, "balance": balance}
-    series = {name: column.astype(int if name in COUNTS else float).tolist() for name, column in columns.items()}
-    return known | most | contacts | how | {"series": series}
+    return {
+        **{"fx": packing.fx, "damped": packing.damped, "rate": rate, "time": float(time[-1])},
+        **{name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")},
+        **{name: int(columns[name].max()) for name in COUNTS},
+        **{"ended": ended, "ends": "flows" if flows else ends, "noise": noise},
+        **{"balance": float(abs(after - before - work) / max(abs(work), after, before)), "series": series},
+    }
 
 
 def _is_over(time: Floats, msd: Floats, rate: float, unit: float) -> bool:
@@ -223,11 +220,10 @@ def _section(scene: Scene) -> Eruptions:
     return settings
 
 
-def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[StartOfRun], float | None]:
+def _starts(scene: Scene, rest: Equilibrium, wanted: list[float], time: float) -> tuple[list[StartOfRun], float | None]:
     """The equilibria at the loads that the packing bears, and the last load that it bears if there are more."""
-    steps = ramp_loads(scene)
-    starts: list[StartOfRun] = []
-    with path_from(settle(scene, communicator=MPI.COMM_SELF), scene) as path:
+    steps, starts = ramp_loads(scene), list[StartOfRun]()
+    with path_from(rest, scene) as path:
         for fx in wanted:
             try:
                 for load in steps[(steps > path.equilibria[-1].fx) & (steps < fx)]:
@@ -239,20 +235,8 @@ def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[StartO
             free = replace(packing, law=replace(packing.law, cn=0.0, ct=0.0), drag_time=None)
             starts.append(StartOfRun(free, residual, time))
             if scene.damping is not None:
-                starts.append(StartOfRun(packing, residual, time, damped=True))
+                starts.append(StartOfRun(packing, residual, time))
     return starts, None
-
-
-def _row(scene: Scene, _: object) -> Row:
-    """A row of a sweep: size and end of the eruption at each load, without time series."""
-    settings = _section(scene)
-    starts, flows_beyond = _starts(scene, sorted(settings.load), settings.time)
-    return {"runs": [_without_series(erupt(each)) for each in starts], "flows_beyond": flows_beyond}
-
-
-def _without_series(run: Row) -> Row:
-    """A run without its samples and what is in its line besides."""
-    return {key: value for key, value in run.items() if key not in ("scene", "version", "series", "longest")}
 
 
 def _runs(rows: Rows, settings: Eruptions) -> list[Row]:
@@ -272,13 +256,11 @@ def _size_figure(runs: list[Row]) -> Figure:
 
     figure = Figure(figsize=(3.4, 4.2), layout="constrained")
     sizes, contacts = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    for ends, (words, marker) in ENDS.items():
-        for damped in (False, True):
-            rows = [row for row in runs if row["ends"] == ends and row["damped"] == damped]
-            if rows:
-                face, label = ("white", f"{words} (damped)") if damped else ("C0", words)
-                places = row_columns(rows, "fx", "msd")
-                sizes.plot(*places, marker, color="C0", markersize=4, markerfacecolor=face, label=label)
+    for ends, damped in dict.fromkeys((run["ends"], run["damped"]) for run in runs):
+        (words, marker), face = ENDS[ends], "white" if damped else "C0"
+        places = row_columns([run for run in runs if (run["ends"], run["damped"]) == (ends, damped)], "fx", "msd")
+        label = f"{words} (damped)" if damped else words
+        sizes.plot(*places, marker, color="C0", markersize=4, markerfacecolor=face, label=label)
     free = [row for row in runs if not row["damped"]]
     fx, slip, noise = row_columns(free, "fx", "slip", "noise")
     sizes.plot(fx, slip**2, "_", color="C1", label="(slip of the layer)$^2$")
@@ -294,7 +276,7 @@ def _size_figure(runs: list[Row]) -> Figure:
     return figure
 
 
-def _course_figure(series: dict[float, dict[str, list[float]]]) -> Figure:
+def _course_figure(runs: list[Row]) -> Figure:
     """D(t) of the undamped runs, coloured by their load."""
     from matplotlib import colormaps
     from matplotlib.figure import Figure
@@ -303,20 +285,17 @@ def _course_figure(series: dict[float, dict[str, list[float]]]) -> Figure:
 
     figure = Figure(figsize=(4.4, 2.7), layout="constrained")
     axes = figure.add_subplot(xscale="log", yscale="log", xlabel="$t$", ylabel="$D(t)$")
-    order = sorted(series)
-    for k, fx in enumerate(order):
-        colour = colormaps["viridis"](0.9 * k / max(1, len(order) - 1))
-        axes.plot(*positive(series[fx]["time"], series[fx]["msd"]), color=colour, linewidth=0.7, label=f"{fx:g}")
+    for run, colour in zip(runs, colormaps["viridis"](np.linspace(0, 0.9, len(runs))), strict=True):
+        shown = positive(run["series"]["time"], run["series"]["msd"])
+        axes.plot(*shown, color=colour, linewidth=0.7, label=f"{run['fx']:g}")
     few_decades(axes, 8)
-    axes.legend(title="$F_x$", ncols=1 + len(order) // 12, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.legend(title="$F_x$", ncols=1 + len(runs) // 12, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
 def _figures(result: Result, rows: Rows) -> Figures:
-    asked = Eruptions.model_validate(result["scene"]["eruptions"])
-    series = {row["fx"]: row["series"] for row in _runs(rows, asked) if not row["damped"]}
-    courses = {"courses": lambda: _course_figure(series)} if series else {}
-    return {"sizes": lambda: _size_figure(result["runs"])} | courses
+    runs = [row for row in _runs(rows, Eruptions.model_validate(result["scene"]["eruptions"])) if not row["damped"]]
+    return {"sizes": lambda: _size_figure(result["runs"]), "courses": lambda: _course_figure(runs)}
 
 
 def _page(result: Result) -> Result:
@@ -324,7 +303,9 @@ def _page(result: Result) -> Result:
     free, damped = ([run for run in runs if run["damped"] is kind] for kind in (False, True))
     beside = {run["fx"]: run for run in damped}
     damping = result["scene"].get("damping") or {}
-    grown = [run["msd"] for run in free if run["ends"] != "stable" and run["msd"] > NOISE_FACTOR * run["noise"]]
+    unstable = [run for run in runs if run["ends"] != "stable"]
+    noisy = [run for run in unstable if run["msd"] <= NOISE_FACTOR * run["noise"]]
+    grown = [run["msd"] for run in free if run in unstable and run not in noisy]
     return {
         "runs": runs,
         "fy": result["scene"]["load"]["fy"],
@@ -332,7 +313,7 @@ def _page(result: Result) -> Result:
         "beside": [(run, beside[run["fx"]]) for run in free if run["fx"] in beside],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
-        "small": sum(run["ends"] != "stable" and run["msd"] <= NOISE_FACTOR * run["noise"] for run in runs),
+        "small": len(noisy),
         "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
         "balance": max(run["balance"] for run in free),
         "criterion": (LATE_GROWTH_OF_D, DECADES_OF_D, QUIET_TIME),
@@ -347,7 +328,7 @@ def _page(result: Result) -> Result:
     figures=_figures,
     page=_page,
     beside="eruptions",
-    row=_row,
+    row=True,
     counts="runs",
     kept="the runs that were over",
     example="faultgouge examples eruptions && mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions",
@@ -358,24 +339,27 @@ def eruptions(scene: Scene, work: Work) -> Result:
     With several ranks, one rank distributes the loads.
     """
     settings, rows = _section(scene), work.rows
-    wanted, time = sorted(settings.load), settings.time
+    wanted, time, flows_beyond = sorted(settings.load), settings.time, None
     kinds = (False,) if scene.damping is None else (False, True)
-    missing = [fx for fx in wanted if any(rows.find(fx=fx, longest=time, damped=kind) is None for kind in kinds)]
-    flows_beyond = None
+
+    def known(fx: float, damped: bool) -> bool:
+        return rows.find(fx=fx, longest=time, damped=damped) is not None
+
+    missing = [fx for fx in wanted if not all(known(fx, damped) for damped in kinds)]
     if missing:
-        work.say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
         # through the known loads as well, so that the path, and with it the last digits, is that of one run
-        starts, flows_beyond = _starts(scene, [fx for fx in wanted if fx <= missing[-1]], time)
-        starts = [each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None]
+        loads = [fx for fx in wanted if fx <= missing[-1]]
+        starts, flows_beyond = _starts(scene, work.start(scene.law.mus[0]), loads, time)
         if flows_beyond is not None:
             work.say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
+        starts = [each for each in starts if not known(each.packing.fx, each.packing.damped)]
         for found in work.progress(work.map_rows(erupt, starts), len(starts)):
             rows.append(longest=time, **found)
             work.say(
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
                 f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
             )
-    runs = _runs(rows, settings)
+    runs, left_out = _runs(rows, settings), ("scene", "version", "series", "longest")
     if not runs:
         raise NoEquilibriumError(f"the packing bears none of the loads: it flows beyond F_x = {flows_beyond:g}")
-    return {"runs": [_without_series(row) for row in runs]}
+    return {"runs": [{key: value for key, value in row.items() if key not in left_out} for row in runs]}

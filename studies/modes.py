@@ -46,7 +46,6 @@ from ..analysis import (
     negative_eigenvalues,
     spectrum,
 )
-from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
 from ..analysis.motion.eigenvalues import SAFETY, Complexes, exceeds_rounding, unit_rounding
 from ..analysis.motion.spectrum import SLICED
@@ -92,12 +91,6 @@ LABELS = {
 
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
 """Of modes.csv."""
-
-PANELS = 4
-"""Loads whose frequencies are drawn side by side."""
-
-FRAMES_A_SECOND = 2.0
-"""Frames of the film a second."""
 
 MediansOverLoad = Mapping[str, Any]
 """loads, and for each quantity a list of [median, low, high]."""
@@ -238,45 +231,14 @@ def load_row(packing: Packing) -> dict[str, Any]:
     return row | {"frequencies": [[float(f"{part:.{FREQUENCY_DIGITS}g}") for part in each] for each in omegas]}
 
 
-class Table(NamedTuple):
-    """One set of packings.
-
-    Attributes
-    ----------
-    name : str
-        Of the set, such as "force 100".
-    rows : tuple of dict
-        A packing each, by seed.
-    """
-
-    name: str
-    rows: tuple[dict[str, Any], ...]
-
-    @property
-    def disks(self) -> int:
-        """Disks of each packing."""
-        words = self.name.split()
-        return int(words[-1]) if words[-1].isdecimal() else 100
-
-    @property
-    def loads(self) -> list[float]:
-        """F_x/F_y that some packing has borne."""
-        return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
-
-    def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
-        """The rows of a load, for every packing that has borne it."""
-        return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
-
-    def at(self, fx_over_fy: float, key: str) -> Floats:
-        """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
-        return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
-
-
-def medians_over_load(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
-    """Medians with intervals at each load, and how many packings bear it."""
-    found: dict[str, Any] = {"packings": len(table.rows), "loads": table.loads}
-    found["count"] = [len(table.at(load, names[0])) for load in table.loads]
-    return found | {name: [median(table.at(load, name)) for load in table.loads] for name in names}
+def medians_over_load(rows: Sequence[Row], names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
+    """Medians with intervals at each load, and how many packings, a row each, bear it; least Q is inf of none."""
+    loads = sorted({load["fx_over_fy"] for row in rows for load in row.get("loads", ())})
+    borne = [[load for row in rows for load in row.get("loads", ()) if load["fx_over_fy"] == each] for each in loads]
+    found: dict[str, Any] = {"packings": len(rows), "loads": loads, "count": [len(each) for each in borne]}
+    for name in names:
+        found[name] = [median([np.inf if load[name] is None else load[name] for load in each]) for each in borne]
+    return found
 
 
 def over_load(courses: Mapping[str, MediansOverLoad], names: Sequence[str] = QUANTITIES) -> Figure:
@@ -324,102 +286,35 @@ def draw_band(axes: Axes, loads: Sequence[float], values: Any, colour: str, labe
     axes.fill_between(loads, shown[:, 1], shown[:, 2], color=colour, alpha=0.2, linewidth=0)
 
 
-def _plane(loads: Sequence[Mapping[str, Any]]) -> Figure:
-    """Frequencies of the complex pairs in the plane of Re omega and Im omega, a panel for each of a few loads."""
-    from matplotlib.figure import Figure
-
-    figure = Figure((3.2 * len(loads), 3.2), layout="constrained")
-    for axes, load in zip(np.atleast_1d(figure.subplots(1, len(loads), sharex=True, sharey=True)), loads, strict=True):
-        points = np.reshape(load["frequencies"], (-1, 2))
-        axes.plot(points[:, 0], points[:, 1], ".", color="C3", markersize=4)
-        axes.set(xlabel=r"$\mathrm{Re}\,\omega$", yscale="log", title=_title(load))
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel(r"$\mathrm{Im}\,\omega$")
-    return figure
-
-
-def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """The plane of frequencies along a ramp as a film, a frame for each load."""
-    from matplotlib.figure import Figure
-
-    from ..figures.film import Film, write_film
-
-    figure = Figure((5, 4), layout="constrained")
-    axes = figure.add_subplot()
-    points = [np.reshape(load["frequencies"], (-1, 2)) for load in loads]
-    every = np.concatenate(points)
-    (line,) = axes.plot([], [], ".", color="C3", markersize=4)
-    words = axes.text(0.5, 1.02, _title(loads[-1]), transform=axes.transAxes, ha="center")
-    axes.set(xlabel=r"$\mathrm{Re}\,\omega$", ylabel=r"$\mathrm{Im}\,\omega$", yscale="log")
-    axes.set(xlim=(0, 1.05 * every[:, 0].max()), ylim=(0.5 * every[:, 1].min(), 2 * every[:, 1].max()))
-
-    def show(number: int) -> None:
-        line.set_data(points[number][:, 0], points[number][:, 1])
-        words.set_text(_title(loads[number]))
-
-    write_film(Film(figure, [line, words], show, len(loads)), path, FRAMES_A_SECOND)
-
-
-def _title(load: Mapping[str, Any]) -> str:
-    return f"$F_x/F_y$ = {load['fx_over_fy']:g}: {100 * load['share']:.0f} % complex"
-
-
 def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
-    """modes.json, modes.csv, pictures and a film in the folder of a sweep; the loads of the first packing in words."""
+    """modes.json, modes.csv and a picture in the folder of a sweep; the loads of the first packing in words."""
     scenes = {point.key: point.scene for point in sweep.points}
     good, lines, packings = [row for row in rows if row["says"] is None], list[Row](), list[Row]()
-    for row in good:
-        scene = scenes[row["key"]]
+    for row in rows:
+        scene, result = scenes[row["key"]], row["result"]
         packing = {} if scene is None else scene.packing.model_dump()
         known = {"disks": packing.get("disks"), "seed": packing.get("seed")}
-        for load in row["result"]["loads"]:
-            lines.append(known | {key: each for key, each in load.items() if key != "frequencies"})
-    for row in rows:
-        ends = {key: row["result"].get(key) for key in ("ends", "reach", "contacts")}
+        lines += [known | {key: load[key] for key in load if key != "frequencies"} for load in result.get("loads", ())]
+        ends = {key: result.get(key) for key in ("ends", "reach", "contacts")}
         packings.append({"values": row["values"], "says": row["says"]} | ends)
     write_json(output / "modes.json", {"asked": sweep.as_dict(), "rows": lines, "packings": packings})
     write_csv(output / "modes.csv", COLUMNS, lines)
+    says = []
     if lines:
-        _draw(good, lines, output, say)
-    else:
-        say("no packing bears any of the loads: there is nothing to draw")
-    return _in_words(lines, packings, output)
-
-
-def _draw(good: Sequence[Row], lines: Sequence[Row], output: Path, say: Say) -> None:
-    """Pictures of all packings over the load, and of the first packing in the plane of frequencies."""
-    from ..figures.style import report_failure, styled
-
-    sizes = sorted({line["disks"] for line in lines if line["disks"] is not None})
-    groups = {"all": list(good)}
-    if len(sizes) > 1:
-        groups = {str(n): [row for row in good if row["values"].get("packing.disks") == n] for n in sizes}
-    tables = [Table(name, tuple(row["result"] for row in group)) for name, group in groups.items()]
-    courses = {table.name: medians_over_load(table) for table in tables}
-    draw_all({"modes": lambda: over_load(courses)}, output, say)
-    shown = [load for load in good[0]["result"]["loads"] if load["pairs"]]
-    if not shown:
-        say("the first packing has no complex pair at these loads: its plane of frequencies is not drawn")
-        return
-    draw_all({"plane": lambda: _plane(shown[:: -max(1, -(-len(shown) // PANELS))][::-1])}, output, say)
-    with report_failure("plane.gif", say):
-        styled(_write_plane_film)(shown, output / "plane.gif")
-
-
-def _in_words(lines: Sequence[Row], packings: Sequence[Row], output: Path) -> list[str]:
-    """The loads of a packing, or the first of many, as a table, and how many packings failed or ended early."""
-    says, table = [], []
-    for row in lines:
-        if (row["disks"], row["seed"]) == (lines[0]["disks"], lines[0]["seed"]):
-            numbers = ("" if row[key] is None else f"{row[key]:.4g}" for key in ("growth_rate", "least_q"))
-            table.append((f"{row['fx_over_fy']:g}", str(row["pairs"]), f"{row['share']:.3f}", *numbers))
-    if table:
+        sizes = dict.fromkeys(row["values"].get("packing.disks") for row in good)
+        groups = {str(n): [row["result"] for row in good if row["values"].get("packing.disks") == n] for n in sizes}
+        courses = {name: medians_over_load(group) for name, group in groups.items()}
+        draw_all({"modes": lambda: over_load(courses)}, output, say)
+        formats = {"fx_over_fy": "g", "pairs": "d", "share": ".3f", "growth_rate": ".4g", "least_q": ".4g"}
+        first = lines[: len(good[0]["result"]["loads"])]
+        table = [
+            ["" if line[k] is None else format(line[k], digits) for k, digits in formats.items()] for line in first
+        ]
         says.append(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), table))
-    failed = [each["says"] for each in packings if each["says"] is not None]
+    failed = [row["says"] for row in rows if row["says"] is not None]
     says.append(f"packings: {len(packings)}, failed: {len(failed)}; written: {output}/modes.json")
     says += [f"the first that failed: {sentence}" for sentence in failed[:1]]
-    short = [each for each in packings if each["says"] is None and each["ends"] != "until"]
-    if short:
+    if short := [row["result"] for row in good if row["result"]["ends"] != "until"]:
         why = "an eigenvalue is negative" if short[0]["ends"] == "turning point" else "there is no equilibrium"
         says.append(
             f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
@@ -443,8 +338,7 @@ def modes(scene: Scene, start: Start) -> Row:
     At each load of the section [modes] the command computes all eigenvalues: the
     share of complex modes, the largest growth rate, and the least Q, the quality
     factor below which dissipation stops all growth. It writes modes.json, modes.csv,
-    pictures over the load and of the plane of frequencies, and a film of this plane.
-    For a sweep, the pictures show medians over packings.
+    and a picture over the load, of a sweep with medians over packings.
 
     Of a drive.h5 the command computes the eigenvalues of each stored state, with the
     stiffness of the spring: complex pairs, growth with and without dissipation, and

@@ -34,7 +34,6 @@ from ..pywrap.load_path import LoadPath
 from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.validation import require_section
 from .packing_tools import Start, contact_pairs, path_from
 from .result_rows import Row
 from .study import task
@@ -48,21 +47,15 @@ about the root of this distance, so that both are accurate."""
 
 @task(reads=PATH, needs=("ramp",))
 def onset(scene: Scene, start: Start) -> Row:
-    """The first onset of a scene with one friction coefficient: `onset_row`."""
-    return onset_row(scene, start)
-
-
-def onset_row(scene: Scene, start: Start) -> Row:
     """The first onset of a scene with one friction coefficient, as a row of a table.
 
     Raises
     ------
     SceneError
-        If the scene has no section [ramp].
+        If the scene has several friction coefficients.
     NoEquilibriumError
         If the packing does not settle.
     """
-    require_section(scene.ramp, "ramp")
     if len(scene.law.mus) > 1:
         raise SceneError('a row has one friction coefficient: give the list as "law.mu" below [sweep]')
     rest = start(scene.law.mus[0])
@@ -79,15 +72,36 @@ def onset_row(scene: Scene, start: Start) -> Row:
     return row
 
 
-def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[EndOfRamp, float, Onset | None]:
-    """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
+def first_window(
+    path: LoadPath[Equilibrium], scene: Scene, dissipation: bool = False
+) -> tuple[EndOfRamp, float, Onset | None]:
+    """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one; with the
+    packing's own dashpots and drag, if asked for."""
     try:
-        found = find_onset(path, ramp_loads(scene), first=True)
+        found = find_onset(path, ramp_loads(scene), first=True, dissipation=dissipation)
     except NoEquilibriumError:
         return "flows", path.equilibria[-1].fx, None
     except OnsetError:
         return "until", path.equilibria[-1].fx, None
     return "onset", found.fx_c, found
+
+
+def first_onset(scene: Scene, rest: Equilibrium, dissipation: bool = False) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        ends : "onset", a window of growing motion, "until", the last F_x of the scene, or "flows", no equilibrium
+        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
+        onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
+    with path_from(rest, scene) as path:
+        ends, reach, found = first_window(path, scene, dissipation)
+        whole = None if found is None else with_path_error(found, path)
+        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
+        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:

@@ -13,7 +13,6 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
-from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -21,25 +20,17 @@ from typing import Any
 import numpy as np
 
 from ..analysis.arrays import Floats
-from ..analysis.files.atomic_write import (
-    FORMAT,
-    FORMAT_KEY,
-    check_format,
-    check_own,
-    read_plain,
-    replace_whole,
-    write_text,
-)
+from ..analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, check_own, read_plain, write_text
 from ..pywrap import Scene, SceneError
 
 Row = dict[str, Any]
 
 
-def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
-    """The rows of a file, each with a key; none if there is no file. The file stays as it is.
+def read_keyed_rows(path: Path, keys: Sequence[str], what: str) -> list[Row]:
+    """The rows of a file, each with some keys, of which the first identifies it; none if there is no file.
 
-    A last line without its end, which a kill has cut or another process is writing, is no row. Raises SceneError if a
-    line is no such row.
+    The file stays as it is. A last line without its end, which a kill has cut or another process is writing, is no row.
+    Raises SceneError if a line is no such row.
     """
     if not path.exists():
         return []
@@ -47,16 +38,16 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
         data = read_plain(path)
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): take it out, or give another folder") from None
-    rows = []
+    rows: list[Row] = []
     for number, line in enumerate(data[: data.rfind(b"\n") + 1].splitlines(), 1):
         try:
             rows.append(json.loads(line))
-            rows[-1][key]
+            identity, *_ = [rows[-1][key] for key in keys]
+            hash(identity)
             number_of_format = rows[-1].pop(FORMAT_KEY, None)
         except (ValueError, KeyError, TypeError, RecursionError):
-            raise SceneError(
-                f"{path}: line {number} is no result of {what}: take it out, or give another folder"
-            ) from None
+            says = f"{path}: line {number} is no result of {what}: take it out, or give another folder"
+            raise SceneError(says) from None
         check_format(number_of_format, f"{path}, line {number},")
     return rows
 
@@ -85,65 +76,61 @@ def append_row(path: Path, row: Mapping[str, Any]) -> None:
 
 
 class Rows:
-    """Lines of one scene in a file, NAME.jsonl; lines of other scenes are left alone.
+    """Rows of one source, a scene or a file, which a line in NAME.jsonl names; lines of others are left alone.
 
-    The section `beside` of the scene may change while the lines remain valid.
+    Without a path nothing is known and nothing is stored.
     """
 
-    def __init__(self, path: Path, scene: Scene, beside: str) -> None:
-        self.path = path
-        whole = {name: keys for name, keys in scene.resolved().items() if name != beside}
-        resolved = whole | scene.digests()  # a name alone does not say which packing it is
-        self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
-        self.rows = [row for row in read_keyed_rows(path, "scene", "a study") if row["scene"] == self._scene]
+    def __init__(self, path: Path | None = None, source: str = "") -> None:
+        self.path, self._source = path, source
+        lines = [] if path is None else read_keyed_rows(path, ("scene",), "a study")
+        self.rows = [row for row in lines if row["scene"] == source]
 
-    def append(self, **row: Any) -> dict[str, Any]:
+    def append(self, **row: Any) -> Row:
         """Write a line; it is in the file when this returns."""
-        row = {"scene": self._scene, "version": version("faultgouge")} | row
-        append_row(self.path, {FORMAT_KEY: FORMAT, **row})
+        row = {"scene": self._source, "version": version("faultgouge")} | row
+        if self.path is not None:
+            append_row(self.path, {FORMAT_KEY: FORMAT, **row})
         self.rows.append(row)
         return row
 
-    def find(self, **wanted: Any) -> dict[str, Any] | None:
+    def find(self, **wanted: Any) -> Row | None:
         """The first line with these values, if there is one."""
         return next((row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())), None)
 
 
-def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+def source_of(scene: Scene, beside: str = "") -> str:
+    """Digits that stand for a scene with the contents of its files, but for the section `beside`."""
+    whole = {name: keys for name, keys in scene.resolved().items() if name != beside}
+    # a name alone does not say which packing it is
+    return hashlib.sha256(json.dumps(whole | scene.digests(), sort_keys=True).encode()).hexdigest()[:12]
+
+
+def flat(result: Mapping[str, Any], above: str = "") -> Row:
     """The result with dicts opened, their keys joined by dots; lists stay."""
-    row: dict[str, Any] = {}
+    row: Row = {}
     for name, value in result.items():
-        if isinstance(value, Mapping):
-            row |= flat(value, f"{above}{name}.")
-        else:
-            row[above + name] = value
+        row |= flat(value, f"{above}{name}.") if isinstance(value, Mapping) else {above + name: value}
     return row
 
 
-def check_table(names: list[str], folder: Path) -> None:
-    """Refuse a results.csv and a results.parquet of others, before work begins.
+def check_table(names: Sequence[str], folder: Path) -> str:
+    """Refuse a results.csv of others; returns how ours begins.
 
     A table begins with the swept keys; that of a scene, which has none, is known by the rows beside it.
     """
-    if names or not (folder / "results.jsonl").exists():
-        check_own(folder / "results.csv", ",".join(names) + ",")
-    check_own(folder / "results.parquet")
+    file, head = folder / "results.csv", "".join(f"{name}," for name in names)
+    if not names and file.is_file() and (folder / "results.jsonl").exists():
+        head = file.read_text().partition("\n")[0]
+    check_own(file, head)
+    return head
 
 
-def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
-    """Write rows in the order of the table, with the swept keys by name: results.csv, results.parquet if it can be."""
+def write_tables(rows: Iterable[Row], names: Sequence[str], folder: Path) -> None:
+    """Write rows in the order of the table, with the swept keys by name: results.csv."""
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
-    columns = [name for name in dict.fromkeys([*names, *(name for row in table for name in row)]) if name != "says"]
-    file = folder / "results.csv"
-    stored = file.read_text().splitlines()[:1] if file.exists() and not names else []
-    write_csv(file, [*columns, "says"], table, "".join(stored) or ",".join(names))
-    if find_spec("pandas") and find_spec("pyarrow"):
-        import pandas as pd
-
-        frame = pd.DataFrame([{column: _plain(row.get(column)) for column in [*columns, "says"]} for row in table])
-        frame.attrs[FORMAT_KEY] = FORMAT
-        with replace_whole(folder / "results.parquet") as new:
-            frame.to_parquet(new)
+    columns = dict.fromkeys([*names, *(name for row in table for name in row if name != "says"), "says"])
+    write_csv(folder / "results.csv", [*columns], table, check_table(names, folder))
 
 
 def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], head: str | None = None) -> None:
@@ -155,10 +142,6 @@ def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], head: st
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     for row in table:
-        cells = [_plain(row.get(column)) for column in columns]
-        writer.writerow([str(cell).lower() if isinstance(cell, bool) else cell for cell in cells])
+        cells = [row.get(column) for column in columns]
+        writer.writerow([json.dumps(cell) if isinstance(cell, bool | list | tuple) else cell for cell in cells])
     write_text(path, text.getvalue(), head=",".join(columns) if head is None else head)
-
-
-def _plain(value: Any) -> Any:
-    return json.dumps(value) if isinstance(value, list | tuple) else value

@@ -103,28 +103,3 @@ def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
     # 3/4 from products of shares may miss 3/4 by its rounding
     places = np.searchsorted(probability, np.array([0.25, 0.5, 0.75]) - 1e-12)
     return [float(fx[place]) if place < len(fx) else None for place in places]
-
-
-def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = DRAWS, seed: int = 0) -> list[float | None]:
-    """Median of F_x^c with lower and upper end of its 95 % interval from resampled packings.
-
-    None stands for what lies beyond what the ramps reached.
-    """
-    reach, found = np.asarray(reach, dtype=float), np.asarray(found, dtype=bool)
-    ends: list[float | None] = [None, None]
-    if len(reach):
-        chosen = np.random.default_rng(seed).integers(len(reach), size=(draws, len(reach)))
-        known = np.sort(_medians(reach[chosen], found[chosen]))
-        low, high = known[int(0.025 * draws)], known[int(0.975 * draws)]
-        ends = [float(end) if np.isfinite(end) else None for end in (low, high)]
-    return [quartiles(reach, found)[1] if len(reach) else None, *ends]
-
-
-def _medians(reach: Floats, found: Bools) -> Floats:
-    """Kaplan and Meier's median of each row, as in `quartiles`; inf where it lies beyond the values reached."""
-    order = np.lexsort((~found, reach), axis=1)  # of equal ones, onsets before packings that are lost there
-    reach, found = np.take_along_axis(reach, order, axis=1), np.take_along_axis(found, order, axis=1)
-    left = np.arange(reach.shape[1], 0, -1)
-    surviving = np.cumprod(1 - found / left, axis=1)
-    half = surviving <= 0.5 + 1e-12
-    return np.where(half.any(axis=1), np.take_along_axis(reach, half.argmax(axis=1)[:, None], axis=1)[:, 0], np.inf)

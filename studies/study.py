@@ -25,11 +25,11 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
 from ..analysis.files.atomic_write import make_folder, write_json, write_text
-from ..pywrap import Scene
+from ..pywrap import Scene, settle
 from ..pywrap.scenes.units import real_units
 from ..pywrap.scenes.validation import Section
 from .packing_tools import Start
-from .result_rows import Row, Rows
+from .result_rows import Row, Rows, source_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,12 +58,14 @@ Gather = Callable[["Sweep", Sequence[Row], Path, Say], Sequence[str]]
 
 
 class Work(NamedTuple):
-    """Inputs of a study besides the scene: known rows, a map over missing rows, and the output of messages."""
+    """Inputs of a study besides the scene: rows that are known, and where new ones go; mu -> the settled packing of the
+    scene; a map over missing rows; and the output of messages."""
 
     rows: Rows
-    map_rows: MapRows
-    say: Say
-    progress: Progress
+    start: Start
+    map_rows: MapRows = map
+    say: Say = lambda line: None
+    progress: Progress = lambda results, _: results
 
 
 def draw_all(figures: Figures, folder: Path, say: Say) -> None:
@@ -79,7 +81,7 @@ def draw_all(figures: Figures, folder: Path, say: Say) -> None:
 class RegisteredStudy:
     """A study, which is called with a scene and a folder; or, of a task, its `row` with a scene and its packing.
 
-    The decorators take all attributes but the first three.
+    The decorators take all attributes but the first two.
 
     Attributes
     ----------
@@ -88,7 +90,8 @@ class RegisteredStudy:
     compute : callable, optional
         Scene, `Work` -> the contents of NAME.json but the scene and its units.
     row : callable, optional
-        The task of a sweep: scene, function mu -> settled packing -> a row. A study may have it, too.
+        The task of a sweep: scene, function mu -> settled packing -> a row. A study with ``row=True`` is a task, too,
+        whose row is what NAME.json holds.
     reads, needs : tuple of str
         Sections of a scene that are read besides its own, and those that it cannot do without.
     section : type of Section, optional
@@ -167,8 +170,9 @@ class RegisteredStudy:
                 return {}
             map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output, f"{self.name}.json", f"{self.name}.md")
-            rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
-            found = self.compute(scene, Work(rows, map_rows, say, progress))
+            rows = Rows(output / f"{self.name}.jsonl", source_of(scene, self.beside))
+            alone = partial(settle, scene, communicator=MPI.COMM_SELF)
+            found = self.compute(scene, Work(rows, alone, map_rows, say, progress))
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
         write_json(output / f"{self.name}.json", result)
@@ -179,9 +183,18 @@ class RegisteredStudy:
         return result
 
 
-def study(**given: Any) -> Callable[[Callable[[Scene, Work], Result]], RegisteredStudy]:
-    """Register the function of a study of one scene; keywords are the attributes of `RegisteredStudy`."""
-    return lambda compute: RegisteredStudy(name=compute.__name__, compute=compute, **given)
+def study(*, row: bool = False, **given: Any) -> Callable[[Callable[[Scene, Work], Result]], RegisteredStudy]:
+    """Register the function of a study of one scene, with ``row=True`` as the task of a sweep, too; other keywords are
+    the attributes of `RegisteredStudy`."""
+
+    def register(compute: Callable[[Scene, Work], Result]) -> RegisteredStudy:
+        def of_scene(scene: Scene, start: Start) -> Row:
+            given.get("check", id)(scene)
+            return compute(scene, Work(Rows(), start))
+
+        return RegisteredStudy(name=compute.__name__, compute=compute, row=of_scene if row else None, **given)
+
+    return register
 
 
 def task(**given: Any) -> Callable[[TaskRow], RegisteredStudy]:

@@ -18,8 +18,9 @@ The user gives v_0. The paper uses the largest velocity of the unperturbed run, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from itertools import groupby
+from math import sqrt
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -27,26 +28,23 @@ from mpi4py import MPI
 from pydantic import Field
 from threadpoolctl import threadpool_limits
 
-from ..analysis import Packing, spectrum
+from ..analysis import NoEquilibriumError, OnsetError, Packing, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.responses.forcing import floor_force, impulse_response
 from ..analysis.responses.response import layer_force
-from ..pywrap import Engine, Scene, SceneError
-from ..pywrap.onset import onset_run
+from ..pywrap import Engine, Equilibrium, Scene, SceneError
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
 from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.units import real_units
 from ..pywrap.scenes.validation import FREQUENCY, TIME, Positive, Section, require_section
-from ..pywrap.settling.settle import settle
 from .eruptions import growth_rate
-from .onset import onset_row
-from .packing_tools import Start, path_from
-from .result_rows import Row, Rows, row_columns
-from .study import Figures, Result, Work, study
+from .onset import first_onset
+from .packing_tools import path_from
+from .result_rows import Row, row_columns
+from .study import Result, Work, study
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DEFAULT_FREQUENCIES = 24
@@ -100,16 +98,10 @@ class Wave(NamedTuple):
     expected: Row
 
 
-def middle(below: float, above: float) -> float:
-    """Half way between two amplitudes, on a logarithmic scale."""
-    return float(np.sqrt(below * above))
-
-
 def threshold(scene: Scene) -> float:
-    """v_0 of the scene. Raises SceneError if the scene does not say it."""
-    if scene.friction is None:
-        raise SceneError("the scene has no section [friction]: add it, with v0, the velocity at which friction weakens")
-    v0 = scene.friction.v0
+    """v_0 of a scene with a ramp. Raises SceneError if the scene does not say it."""
+    require_section(scene.ramp, "ramp")
+    v0 = require_section(scene.friction, "friction").v0
     if isinstance(v0, str) or v0 == 0:
         raise SceneError(
             f"friction.v0 = {v0!r} gives no threshold to exceed, since the velocity of a run that nobody perturbs is "
@@ -123,12 +115,12 @@ def settings(scene: Scene) -> Trigger:
     return section_of(scene, Trigger) or Trigger()
 
 
-def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
-    """The packings in equilibrium at some loads, along the ramp of the scene."""
-    wanted, start = sorted(fx), settle(scene, communicator=MPI.COMM_SELF)
-    with path_from(start, scene) as path:
+def equilibria(scene: Scene, rest: Equilibrium, fx: Iterable[float]) -> dict[float, Packing]:
+    """The packings in equilibrium at some loads, along the ramp of the scene from the settled packing on."""
+    wanted = sorted(fx)
+    with path_from(rest, scene) as path:
         for load in ramp_loads(scene):
-            if start.fx < load <= wanted[-1]:
+            if rest.fx < load <= wanted[-1]:
                 path(float(load))
         return {each: path(each) for each in wanted}
 
@@ -162,27 +154,12 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
     return [known | dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
 
 
-def map_predictions(
-    scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
-) -> Iterator[tuple[float, list[Row]]]:
-    """The predictions at each distance, the largest first, at the frequencies of the scene; where the scene names none,
-    at those of the modes of the packing with the smallest load."""
-    omegas = np.array(sorted(settings(scene).omega or ()))
-    if packings and not len(omegas):
-        modes = np.sqrt(np.abs(spectrum(packings[min(packings)]).eigenvalues))
-        slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
-        omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
-    for distance in sorted(distances, reverse=True):
-        yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
-
-
 def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
     """So many points of the map, spread over distances and frequencies."""
-    ordered = sorted(predicted, key=lambda each: (-each["distance"], each["omega"]))
-    rows = [list(row) for _, row in groupby(ordered, key=lambda each: each["distance"])]
-    share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
+    rows = [list(row) for _, row in groupby(predicted, key=lambda each: each["distance"])]
     picked = []
-    for k, (row, count) in enumerate(zip(rows, share, strict=True)):
+    for k, row in enumerate(rows):
+        count = runs // len(rows) + (k < runs % len(rows))
         # from row to row the places move on by a part of their own distance, so that all frequencies have their turn
         places = (np.arange(count) + (k + 0.5) / len(rows)) * len(row) / max(1, count)
         picked += [row[place] for place in sorted({min(int(p), len(row) - 1) for p in places})]
@@ -198,88 +175,52 @@ def bisect_amplitude(wave: Wave) -> Row:
         fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the weakest that
         did; runs : of the bisection; reached : when the weakest one triggered, time.
     """
-    predicted, runs = wave.expected["predicted"], 0
+    predicted, omega, v0, runs = wave.expected["predicted"], wave.expected["omega"], threshold(wave.scene), 0
     dt, given = time_step(wave.packing), settings(wave.scene)
     steps = int(given.time / dt)
     target = None if given.on == "layer" else range(len(wave.packing))
 
     def triggers(amplitude: float) -> float | None:
         """The time at which the wave brings the layer above v_0; None if there is no such time."""
-        nonlocal runs
-        runs += 1
         with (
             Engine(wave.packing, MPI.COMM_SELF) as engine,
-            engine.undamped(dt, amplitude, wave.expected["omega"], target) as dynamics,
-            dynamics.halt_above(threshold(wave.scene)),
+            engine.undamped(dt, amplitude, omega, target) as dynamics,
+            dynamics.halt_above(v0),
         ):
             dynamics.advance(steps)
             return dynamics.steps * dt if dynamics.steps < steps else None
 
+    below, above, reached = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET), None
+    holds = False  # whether the wave `below` is known not to trigger
     with threadpool_limits(1):
-        below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
-        while (reached := triggers(above)) is None and runs < BISECTION_RUNS:
-            below, above = above, above * BRACKET_FACTOR
-        if reached is None:
-            says = f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0"
-            raise SceneError(says)
-        while below < predicted and (time := triggers(below)) is not None:
-            if runs >= BISECTION_RUNS or triggers(0.0) is not None:
-                raise SceneError(
-                    f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {threshold(wave.scene):g} without a wave, "
-                    "by rounding noise, so that no amplitude is critical: raise friction.v0"
-                )
-            below, above, reached = below / BRACKET_FACTOR, below, time
-            runs -= 1  # the run without a wave is none of the bisection
-        while above / below > 1 + BISECTION_WIDTH and runs < BISECTION_RUNS:
-            between = middle(below, above)
-            time = triggers(between)
+        while reached is None or not holds or above / below > 1 + BISECTION_WIDTH:
+            if runs == BISECTION_RUNS:
+                break
+            amplitude = above if reached is None else below if not holds else sqrt(below * above)
+            time, runs = triggers(amplitude), runs + 1
             if time is None:
-                below = between
+                below, holds = amplitude, True
+                above = amplitude * BRACKET_FACTOR if reached is None else above
+            elif reached is None:
+                reached = time
+            elif holds:
+                above, reached = amplitude, time
             else:
-                above, reached = between, time
+                if triggers(0.0) is not None:
+                    break
+                below, above, reached = amplitude / BRACKET_FACTOR, amplitude, time
+    if reached is None:
+        raise SceneError(f"no wave up to {above:.3g} triggers at omega = {omega:g}: lower friction.v0")
+    if not holds:
+        raise SceneError(
+            f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {v0:g} without a wave, by rounding noise, so that "
+            "no amplitude is critical: raise friction.v0"
+        )
     known = {key: wave.expected[key] for key in ("fx", "distance", "omega")}
     return known | {"below": below, "above": above, "runs": runs, "reached": reached}
 
 
-def _row(scene: Scene, start: Start) -> Row:
-    """A row of a sweep: the map of one scene, with the bisections that [trigger] asks for.
-
-    Raises SceneError if the scene has no section [ramp], or no v_0.
-    """
-    threshold(scene)
-    wave, first = settings(scene), onset_row(scene, start)
-    row: Row = {"ends": first["ends"], "fx_c": first["fx_c"], "map": [], "measured": []}
-    if first["ends"] == "onset":
-        packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
-        for _, rows in map_predictions(scene, packings, first["fx_c"], wave.distance):
-            row["map"] += rows
-        for each in spread_over_map(row["map"], wave.runs):
-            found = bisect_amplitude(Wave(scene, packings[each["fx"]], each))
-            row["measured"].append(found | {"amplitude": middle(found["below"], found["above"])})
-    return row
-
-
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
-
-
-def _map_figure(result: Result) -> Figure:
-    """The critical amplitude over frequency and distance from the onset; colours are from K, and there are circles
-    where LAMMPS was asked, in the colour of its own answer."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
-    distance, omega, amplitude = _grid(result["map"])
-    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel="$1 - F_x/F_x^c$")
-    norm = LogNorm(np.nanmin(amplitude), np.nanmax(amplitude))
-    colours = axes.pcolormesh(_edges(omega), _edges(distance), amplitude, norm=norm, cmap="viridis_r")
-    runs = [row for row in result["map"] if row["measured"] is not None]
-    across, up, measured = row_columns(runs, "omega", "distance", "measured")
-    axes.scatter(across, up, c=measured, norm=norm, cmap="viridis_r", s=22, edgecolors="white", linewidths=0.9)
-    axes.minorticks_off()
-    bar = figure.colorbar(colours, ax=axes)
-    bar.set_label(rf"{WAVE[result['on']]}$_c$ that triggers")
-    return figure
 
 
 def _threshold_figure(result: Result) -> Figure:
@@ -292,66 +233,36 @@ def _threshold_figure(result: Result) -> Figure:
 
     from ..figures.style import INK
 
-    distance, omega, amplitude = _grid(result["map"])
     figure = Figure(figsize=(3.4, 2.9), layout="constrained")
-    axes: Axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel=WAVE[result["on"]])
-    for k, (each, curve) in enumerate(zip(distance, amplitude, strict=True)):
-        colour, exponent = f"C{k % 6}", np.log10(each)
-        power = f"10^{{{round(exponent)}}}" if abs(exponent - round(exponent)) < 1e-9 and each < 0.1 else f"{each:g}"
-        axes.plot(omega, curve, color=colour, linewidth=3.2 - 2.4 * k / len(distance), label=f"${power}$")
-        runs = [row for row in result["map"] if row["distance"] == each and row["measured"] is not None]
-        across, below, above = row_columns(runs, "omega", "below", "above")
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel=WAVE[result["on"]])
+    curves = [list(rows) for _, rows in groupby(result["map"], key=lambda row: row["distance"])][::-1]
+    for k, rows in enumerate(curves):
+        colour, width = f"C{k % 6}", 3.2 - 2.4 * k / len(curves)
+        axes.plot(*row_columns(rows, "omega", "predicted"), color=colour, lw=width, label=f"{rows[0]['distance']:g}")
+        across, below, above = row_columns([row for row in rows if row["measured"]], "omega", "below", "above")
         axes.plot(across, 1.12 * above, "^", color=colour, markersize=3.5)  # so far apart that both are seen
         axes.plot(across, below / 1.12, "v", color=colour, markersize=3.5, markerfacecolor="white")
-    nearest = [row for row in result["map"] if row["distance"] == distance[0]]
-    axes.plot(*row_columns(nearest, "omega", "stationary"), ":", color=INK, linewidth=0.8)
+    axes.plot(*row_columns(curves[0], "omega", "stationary"), ":", color=INK, linewidth=0.8)
     axes.legend(title="$1 - F_x/F_x^c$", ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 
-def _grid(rows: list[Row]) -> tuple[Floats, Floats, Floats]:
-    """Distances and frequencies, increasing, and a_c of the two."""
-    at, of, predicted = row_columns(rows, "distance", "omega", "predicted")
-    distance, omega = np.unique(at), np.unique(of)
-    amplitude = np.full((len(distance), len(omega)), np.nan)
-    amplitude[np.searchsorted(distance, at), np.searchsorted(omega, of)] = predicted
-    return distance, omega, amplitude
-
-
-def _edges(centres: Floats) -> Floats:
-    """Borders of the cells about some values, half way on a logarithmic scale."""
-    if len(centres) == 1:
-        return centres[0] * np.array([0.8, 1.25])
-    between = np.sqrt(centres[1:] * centres[:-1])
-    return np.concatenate([[centres[0] ** 2 / between[0]], between, [centres[-1] ** 2 / between[-1]]])
-
-
-def _figures(result: Result, _: Rows) -> Figures:
-    return {"map": lambda: _map_figure(result), "thresholds": lambda: _threshold_figure(result)}
-
-
 def _page(result: Result) -> Result:
-    rows, distances = result["map"], []
-    for distance, group in groupby(rows, key=lambda row: row["distance"]):
-        slowest, *others = group  # by frequency
-        distances.append((distance, min([slowest, *others], key=lambda row: row["predicted"]), slowest))
-    runs = [row for row in rows if row["measured"] is not None]
-    return {"runs": runs, "distances": distances, "damped": bool(result["scene"].get("damping"))}
-
-
-def _check(scene: Scene) -> None:
-    threshold(scene)
-    require_section(scene.ramp, "ramp")
+    distances = []
+    for distance, group in groupby(result["map"], key=lambda row: row["distance"]):
+        rows = list(group)  # by frequency
+        distances.append((distance, min(rows, key=lambda row: row["predicted"]), rows[0]))
+    return {"runs": [row for row in result["map"] if row["measured"] is not None], "distances": distances}
 
 
 @study(
     reads=(*PATH, "friction"),
     needs=("ramp", "friction"),
     section=Trigger,
-    check=_check,
-    figures=_figures,
+    check=threshold,
+    figures=lambda result, rows: {"thresholds": lambda: _threshold_figure(result)},
     page=_page,
-    row=_row,
+    row=True,
     counts="bisections",
     example="faultgouge examples trigger && echo 'runs = 1' >> trigger.toml && faultgouge trigger trigger.toml",
 )
@@ -363,47 +274,50 @@ def trigger(scene: Scene, work: Work) -> Result:
     the velocity above which friction weakens. With several ranks, one rank
     distributes the runs.
     """
-    rows, given = work.rows, settings(scene)
+    rows, given, rest = work.rows, settings(scene), work.start(scene.law.mus[0])
     first = rows.find(kind="onset")
     if first is None:
         work.say("onset")
-        found = onset_run(scene, scene.law.mus[0], dissipation=scene.damping is not None)
-        work.say(found.describe())
-        undamped = None if found.undamped is None else found.undamped.fx_c
-        first = rows.append(kind="onset", fx_c=found.fx_c, error=found.error, undamped_fx_c=undamped)
-    fx_c, distances = first["fx_c"], sorted(given.distance, reverse=True)
-    missing = [d for d in distances if rows.find(kind="predicted", distance=d) is None]
-    packings = equilibria(scene, [fx_c * (1 - d) for d in distances]) if missing else {}
-    for distance, new in map_predictions(scene, packings, fx_c, missing):
-        rows.append(kind="predicted", distance=distance, found=new)
-        least = min(new, key=lambda each: each["predicted"])
+        found, _ = first_onset(scene, rest, dissipation=scene.damping is not None)
+        if found["ends"] != "onset":
+            error = NoEquilibriumError if found["ends"] == "flows" else OnsetError
+            raise error(f"no motion grows up to F_x = {found['reach']:.10g}, where the ramp ends: raise ramp.until")
+        first = rows.append(kind="onset", fx_c=found["reach"], error=found["error"])
+    distances = sorted(given.distance, reverse=True)
+    # of all distances: the path is that of one run of the command
+    packings = equilibria(scene, rest, [first["fx_c"] * (1 - distance) for distance in distances])
+    omegas = np.array(sorted(given.omega or ()))
+    if not len(omegas):
+        modes = np.sqrt(np.abs(spectrum(packings[min(packings)]).eigenvalues))
+        slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
+        omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
+    predicted = list[Row]()
+    for distance in distances:
+        known = rows.find(kind="predicted", distance=distance)
+        if known is None:
+            new = predictions(scene, packings[first["fx_c"] * (1 - distance)], distance, omegas)
+            known = rows.append(kind="predicted", distance=distance, found=new)
+        predicted += known["found"]
+        least = min(known["found"], key=lambda each: each["predicted"])
         work.say(
             f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {least['predicted']:.3g}, at omega = {least['omega']:.4g}"
         )
-    known = [row for row in rows.rows if row["kind"] == "predicted" and row["distance"] in distances]
-    predicted: list[Row] = [each for row in known for each in row["found"]]
     wanted = spread_over_map(predicted, given.runs)
 
     def measured(each: Row) -> Row | None:
         return rows.find(kind="measured", fx=each["fx"], omega=each["omega"])
 
-    to_bisect = [each for each in wanted if measured(each) is None]
-    if len(to_bisect) < len(wanted):
-        work.say(f"{len(wanted) - len(to_bisect)} of {len(wanted)} bisections are in {rows.path} already")
-    if to_bisect:
-        packings = equilibria(scene, {each["fx"] for each in wanted})  # all: the path is that of one run of the command
-        waves = [Wave(scene, packings[each["fx"]], each) for each in to_bisect]
-        for bisected in work.progress(work.map_rows(bisect_amplitude, waves), len(waves)):
-            rows.append(kind="measured", **bisected)
-            at = f"omega = {bisected['omega']:.4g} at {bisected['distance']:g}"
-            work.say(f"{at}: triggers from {middle(bisected['below'], bisected['above']):.4g} on in LAMMPS")
-    asked = {(each["fx"], each["omega"]) for each in wanted}
+    waves = [Wave(scene, packings[each["fx"]], each) for each in wanted if measured(each) is None]
+    for bisected in work.progress(work.map_rows(bisect_amplitude, waves), len(waves)):
+        rows.append(kind="measured", **bisected)
+        at = f"omega = {bisected['omega']:.4g} at {bisected['distance']:g}"
+        work.say(f"{at}: triggers from {sqrt(bisected['below'] * bisected['above']):.4g} on in LAMMPS")
     real, table, off = real_units(scene), list[Row](), list[float]()
-    for row in sorted(predicted, key=lambda p: (-p["distance"], p["omega"])):
+    for row in predicted:
+        run = measured(row) if row in wanted else None
         row = row | {"measured": None}
-        run = measured(row) if (row["fx"], row["omega"]) in asked else None
         if run is not None:
-            row |= {"measured": middle(run["below"], run["above"]), "triggers_at": run["reached"]}
+            row |= {"measured": sqrt(run["below"] * run["above"]), "triggers_at": run["reached"]}
             row |= {key: run[key] for key in ("below", "above", "runs")}
             off.append(abs(row["predicted"] / row["measured"] - 1))
         if real is not None:
@@ -412,10 +326,7 @@ def trigger(scene: Scene, work: Work) -> Result:
             row |= {"strain": velocity / real.shear_wave, "stress_ratio": row["fx"] / real.fy}
         table.append(row)
     return {
-        **{key: first[key] for key in ("fx_c", "error", "undamped_fx_c")},
-        "v0": threshold(scene),
-        "time": given.time,
-        "on": given.on,
-        "largest_deviation": max(off, default=None),
-        "map": table,
+        **{key: first[key] for key in ("fx_c", "error")},
+        **{"v0": threshold(scene), "time": given.time, "on": given.on},
+        **{"largest_deviation": max(off, default=None), "map": table},
     }

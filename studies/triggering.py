@@ -35,8 +35,8 @@ slowly for the length of the run; the rate is therefore stored as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -53,13 +53,12 @@ from ..analysis.responses.response import LinearMotion
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening
-from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.scene_path import next_equilibrium
 from ..pywrap.runs.undamped import perturb, weakening_of
 from ..pywrap.scenes.command_sections import UNDAMPED_SECTIONS
 from ..pywrap.scenes.validation import require_section
-from .onset import first_window
-from .packing_tools import Start, path_from
+from .onset import first_onset
+from .packing_tools import Start
 from .result_rows import Row
 from .statistics import quartiles, share, sign_test
 from .study import Say, task
@@ -139,8 +138,7 @@ class TriggeringOutcome(NamedTuple):
     fitted: Growth | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Triggering:
+class Triggering(NamedTuple):
     """Undamped runs from one equilibrium.
 
     Attributes
@@ -168,8 +166,7 @@ class Triggering:
     outcome: TriggeringOutcome
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(NamedTuple):
     """Response of the pair that is about to coalesce, over the distance from the onset.
 
     Attributes
@@ -249,8 +246,7 @@ def follow(
     length = float(erupting["time"][-1])
     left = max(length - (time_of_crossing(erupting, weakening.v0) or 0.0), JUMP_SHARE * length)
     foreseen = forecast(start, start.packing.law.mu * friction.mu_ss, left, JUMP_SHARE * length)
-    outcome = judge(erupting, weakening.v0, foreseen)
-    return Triggering(scene, start, weakening, runs, foreseen, outcome)
+    return Triggering(scene, start, weakening, runs, foreseen, judge(erupting, weakening.v0, foreseen))
 
 
 def time_of_crossing(run: Series, v0: float) -> float | None:
@@ -346,24 +342,6 @@ def frictions(scene: Scene) -> tuple[float, ...]:
     return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
 
 
-def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equilibrium, ...]]:
-    """How the ramp of a scene ends for one friction coefficient, with its equilibria up to there.
-
-    Returns
-    -------
-    row : dict
-        mu; ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no
-        equilibrium beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper
-        layer: the onset, if there is one; error : uncertainty of the onset, or None.
-    path : tuple of Equilibrium
-    """
-    with path_from(start(mu), scene) as path:
-        ends, reach, found = first_window(path, scene)
-        whole = None if found is None else with_path_error(found, path)
-        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
-        return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
-
-
 def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, float]) -> Row:
     """The runs in a window between two onsets, and the control; path leads up to the upper one.
 
@@ -414,8 +392,9 @@ def summary_of_rows(rows: Sequence[Row]) -> dict[str, Any]:
         control_rise_quartiles : decades, or None; unstable_when_weakened, grows, perturbation_shows : shares of the
         scenes with runs. A share is what `share` returns.
     """
-    ramps = [end for row in rows for end in row["result"].get("ramps", ())]
-    eruptions = [found for row in rows if (found := row["result"].get("eruption"))]
+    results = [row["result"] for row in rows]
+    ramps = [end for result in results for end in result.get("ramps", ())]
+    eruptions = [found for result in results if (found := result.get("eruption"))]
     several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
     decided = [row["result"]["lowered"] for row in several if row["result"]["lowered"] is not None]
     undecided = [row for row in several if row["result"]["lowered"] is None and row["says"] is None]
@@ -455,23 +434,6 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
     return in_words(numbers)
 
 
-def _examination(scene: Scene, start: Start) -> Iterator[Row]:
-    """The results of each stage, so that a stage that fails loses none of the earlier ones."""
-    ramps, paths = list[Row](), list[tuple[Equilibrium, ...]]()
-    for mu in frictions(scene):
-        end, path = first_onset(scene, mu, start)
-        ramps.append(end)
-        paths.append(path)
-        yield {"ramps": [*ramps]}
-    if len(ramps) < 2:
-        return
-    strong, weak = ramps[0], ramps[-1]
-    lowered = sign_test(strong, weak)
-    yield {"lowered": lowered}
-    if lowered and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
-        yield {"eruption": eruption(scene, paths[0], (weak["reach"], strong["reach"]))}
-
-
 @task(reads=UNDAMPED_SECTIONS, needs=("ramp",), gather=_gather, writes={"summary.json": ""})
 def triggering(scene: Scene, start: Start) -> Row:
     """Onsets for several friction coefficients, and the runs between them. An error is the row's "says", beside the
@@ -484,11 +446,19 @@ def triggering(scene: Scene, start: Start) -> Row:
         to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption : what
         `eruption` finds, None without a window between the two onsets, or without [perturb] in the scene.
     """
-    row: Row = {"ramps": [], "lowered": None, "eruption": None}
     require_section(scene.ramp, "ramp")
+    row: Row = {"ramps": [], "lowered": None, "eruption": None}
+    paths = list[tuple[Equilibrium, ...]]()
     try:
-        for found in _examination(scene, start):
-            row |= found
+        for mu in frictions(scene):
+            end, path = first_onset(scene, start(mu))
+            row["ramps"].append({"mu": mu} | end)
+            paths.append(path)
+        strong, weak = row["ramps"][0], row["ramps"][-1]
+        if len(paths) > 1:
+            row["lowered"] = sign_test(strong, weak)
+        if row["lowered"] and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
+            row["eruption"] = eruption(scene, paths[0], (weak["reach"], strong["reach"]))
     except (FaultgougeError, ValueError) as error:  # ValueError: of LAPACK
         row["says"] = str(error)
     return row

@@ -45,7 +45,7 @@ for block in re.findall(r"((?:^    .*\n|^\n)+)", page, re.MULTILINE):
     text = re.sub(r"^    ", "", block.strip("\n"), flags=re.MULTILINE)
     name = re.search(r"faultgouge (\w+) ", text)
     if text.startswith("#!/bin/bash") and name:
-        (folder / f"{name[1]}{'_shared' if '--slices' in text else ''}.sh").write_text(text + "\n")
+        (folder / f"{name[1]}.sh").write_text(text + "\n")
 PY
 }
 
@@ -84,7 +84,6 @@ until = 2e-2
 SCENE
 sbatch --wait sweep.sh
 sbatch --wait onset.sh
-sbatch --wait onset_shared.sh
 "$HOME/faultgouge/bin/faultgouge" merge part1 part2 part3 part4 part5 part6 part7 part8 -o all
 test "$(wc -l <all/results.csv)" = 17
 test -s onset.json

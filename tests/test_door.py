@@ -5,8 +5,6 @@ import doctest
 import importlib
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -33,13 +31,6 @@ def test_every_name_that_is_offered_is_there_for_type_checkers_and_a_star_too(pa
         _ = package.nothing
 
 
-def test_driver_imports_what_is_used():
-    """The onset of a scene does without the packings of a live LAMMPS."""
-    code = "import sys; import faultgouge.pywrap.onset; print([name for name in sys.modules if '.granular' in name])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
-
-
 @pytest.mark.parametrize("name", ["onset", "pair", "settle", "ramp", "perturb", "drive"])
 def test_a_scene_may_be_the_path_of_its_file(tmp_path, name):
     with pytest.raises(BadInputError, match="the scene cannot be read"):
@@ -64,8 +55,6 @@ def test_a_packing_may_be_the_path_of_its_file(cluster_file):
 def test_a_path_in_a_wrong_place_is_refused_with_the_right_call(cluster_file, tmp_path):
     with pytest.raises(BadInputError, match=r"and no str: draw\(packing\)\.savefig\(path\) writes a file\.$"):
         faultgouge.draw(cluster_file, "p q.png")
-    with pytest.raises(BadInputError, match=r"Scene\.from_toml\(path\) reads a file\.$"):
-        faultgouge.Scene("scene.toml")
     with pytest.raises(BadInputError, match=r"^sweep takes the path of a SWEEP.toml, or a mapping .* no NoneType\.$"):
         faultgouge.sweep(None, tmp_path)
 
@@ -130,14 +119,6 @@ def test_pair_of_a_scene_is_a_curve_through_its_onset():
     near = (distance > 1e-6) & (distance < 2e-3)
     slope = np.polyfit(np.log(distance[near]), np.log(np.abs(half[near])), 1)[0]
     assert slope == pytest.approx(0.5, abs=0.01)
-
-
-def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):
-    packing = faultgouge.load(cluster_file)
-    assert isinstance(packing, Packing)
-    faultgouge.draw(packing)
-    page = faultgouge.view(cluster_file, tmp_path / "page.html")
-    assert page.read_text().startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize("name", ["packing.xyz", "packing.gsd"])

@@ -53,7 +53,7 @@ FLOORS = {
         ("runs",),
         ("onset",),
     ),
-    "faultgouge.assessment": (("explain", "extremes", "work_precision"),),
+    "faultgouge.assessment": (("explain", "results"), ("extremes", "work_precision")),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""
 

@@ -48,8 +48,7 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     """
     matrix, active = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], operator_rounding(packing, matrix.data)
-    particle = active % len(packing.configuration)
-    symmetric = csc_array(0.5 * (matrix + matrix.T))
+    particle, symmetric = active % len(packing.configuration), csc_array(0.5 * (matrix + matrix.T))
     shifts = SAFETY * rounding + imbalance(packing)[particle]
     if _is_positive(symmetric, shifts):
         return np.zeros(0)
@@ -58,13 +57,10 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
         bound *= 4  # each costs factors, and a loose one more eigenvalues
-    count = 16
-    while True:
-        count = min(count, size - 2)
+    count, found = 8, None
+    while found is None or (count < size - 2 and np.abs(found.values + 0.5 * bound).max() <= 0.5 * bound):
+        count = min(2 * count, size - 2)
         found = nearest_modes(packing, -0.5 * bound, count)
-        if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
-            break
-        count *= 2
     zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
     return np.sort(found.values[is_negative(found.values, found.overlap, rounding, zero)].real)
 
@@ -78,8 +74,7 @@ def surely_positive(matrix: csr_array) -> bool:
         Zero rows are left out.
     """
     active = active_coordinates(matrix)
-    inner = matrix[active][:, active]
-    return _is_positive(csc_array(0.5 * (inner + inner.T)), 0.0)
+    return _is_positive(csc_array(0.5 * (matrix + matrix.T))[active][:, active], 0.0)
 
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
@@ -130,18 +125,18 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
     factor = symmetric_lu(shifted, pivoting=DIAGONAL_PIVOT)  # the shift may be next to an eigenvalue
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
-    start = np.ones(size, dtype=number)
-    solves = 0
+    start, solves = np.ones(size, dtype=number), 0
 
-    def solve(vector: Complexes, trans: str) -> Complexes:
-        nonlocal solves
-        solves += 1
-        return factor.solve(vector, trans=trans)
+    def nearest(of: csr_array, sigma: complex, trans: str) -> tuple[Complexes, Complexes]:
+        def solve(vector: Complexes) -> Complexes:
+            nonlocal solves
+            solves += 1
+            return factor.solve(vector, trans=trans)
 
-    inverse = LinearOperator(shifted.shape, lambda v: solve(v, "N"), dtype=number)
-    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
-    adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
-    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
+        inverse = LinearOperator(shifted.shape, solve, dtype=number)
+        return eigs(of, count, sigma=sigma, OPinv=inverse, v0=start, tol=tolerance)
+
+    (values, right), (mirrored, left) = nearest(matrix, shift, "N"), nearest(matrix.T, np.conj(shift), "H")
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue

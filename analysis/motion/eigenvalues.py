@@ -157,21 +157,6 @@ def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding
     return bool(abs(eigenvalue.imag) * overlap > SAFETY * rounding)
 
 
-def growing(rate: Complexes | complex, overlap: Floats | float, rounding: float) -> NDArray[np.bool_]:
-    """Which s grow in spite of dissipation, beyond rounding.
-
-    Parameters
-    ----------
-    rate : ndarray of complex
-        Eigenvalues s of the first-order system, 1 / time.
-    overlap : ndarray
-        |l^H r| of their unit vectors.
-    rounding : float
-        u |Z|_F, 1 / time.
-    """
-    return np.asarray(np.asarray(rate).real * np.asarray(overlap) > SAFETY * rounding)
-
-
 def growing_undamped(
     values: Complexes, overlap: Floats, rounding: float, zero: Floats | float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -30,7 +30,6 @@ from .certificate import NoProofError, prove
 from .eigenvalues import (
     SAFETY,
     Linear,
-    growing,
     growing_undamped,
     is_zero,
     operator_rounding,
@@ -39,7 +38,7 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .modes import Modes
-from .motion import EnergyNorm, Motion
+from .motion import Motion, energy_norm, matrix_in_norm
 from .random_state import fastest_growing, follow_decay
 
 LAPACK_FIRST = 1000
@@ -184,12 +183,12 @@ def _damped_rates(motion: Motion, rounding: float) -> tuple[Complexes, NDArray[n
         if held.shape[1]:
             others = qr(free @ held)[0][:, held.shape[1] :]
     a, g = others.T @ a @ others, others.T @ g @ others
-    z = EnergyNorm.of(a).first_order(a, g)
+    z = matrix_in_norm(energy_norm(a), a, g)
     values, of_z = eigvals(z, check_finite=False), operator_rounding(packing, z)
     grows = values.real > np.sqrt(SAFETY * of_z * np.abs(values).max(initial=0.0))  # no double one is as uncertain
     if np.any(~grows & (values.real > 0)):  # vectors take three times as long as eigenvalues
         values, left, right = eig(z, left=True, check_finite=False)
-        grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), of_z)
+        grows = values.real * np.abs(np.sum(left.conj() * right, axis=0)) > SAFETY * of_z
     counts = values.imag >= 0
     counts[np.argsort(np.abs(values))[:count]] = False  # of motions that dashpots alone oppose one s is zero, once
     return values[counts], grows[counts], free.shape[1], SAFETY * of_z

@@ -28,6 +28,7 @@ displacement.
 
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.linalg import eigh
@@ -41,34 +42,26 @@ from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import active_coordinates, mass_weighted
 
 
-@dataclass(frozen=True, eq=False)
-class EnergyNorm:
-    """The coordinates p = W z of a stiffness A.
+def energy_norm(stiffness: Floats) -> SimpleNamespace:
+    """The coordinates p = W z of a stiffness A, shape (E, E).
 
-    Attributes
-    ----------
-    weight, unweight : ndarray, shape (E, E)
-        W, 1 / time, and its inverse.
-    positive : bool
-        Whether the symmetric part of A is positive definite, so that the norm of a state is twice its energy.
+    Returns
+    -------
+    SimpleNamespace
+        `weight` and `unweight`, W, 1 / time, and its inverse, shape (E, E); `positive`: whether the symmetric part of A
+        is positive definite, so that the norm of a state is twice its energy.
     """
+    values, vectors = eigh(0.5 * (stiffness + stiffness.T)) if len(stiffness) else (np.zeros(0), stiffness)
+    # a mode without a restoring force has no energy of its own: it weighs as much as one of this share
+    least = 1e-6 * np.abs(values).max(initial=0.0)
+    size = np.sqrt(np.maximum(np.abs(values), least))
+    positive = bool(np.all(values > least))
+    return SimpleNamespace(weight=size[:, None] * vectors.T, unweight=vectors / size, positive=positive)
 
-    weight: Floats
-    unweight: Floats
-    positive: bool
 
-    @classmethod
-    def of(cls, stiffness: Floats) -> "EnergyNorm":
-        """The norm of A, shape (E, E)."""
-        values, vectors = eigh(0.5 * (stiffness + stiffness.T)) if len(stiffness) else (np.zeros(0), stiffness)
-        # a mode without a restoring force has no energy of its own: it weighs as much as one of this share
-        least = 1e-6 * np.abs(values).max(initial=0.0)
-        size = np.sqrt(np.maximum(np.abs(values), least))
-        return cls(size[:, None] * vectors.T, vectors / size, bool(np.all(values > least)))
-
-    def first_order(self, stiffness: Floats, damping: Floats) -> Floats:
-        """Z of A and G, shape (2E, 2E), 1 / time."""
-        return np.block([[np.zeros_like(self.weight), self.weight], [-stiffness @ self.unweight, -damping]])
+def matrix_in_norm(norm: SimpleNamespace, stiffness: Floats, damping: Floats) -> Floats:
+    """Z of A and G in an energy norm, shape (2E, 2E), 1 / time."""
+    return np.block([[np.zeros_like(norm.weight), norm.weight], [-stiffness @ norm.unweight, -damping]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +112,6 @@ class Motion:
             k = csr_array(k + sliders.force @ sliders.excess)
             if c.nnz:
                 c = csr_array(c + sliders.force @ sliders.viscous_excess)
-        return cls.of_matrices(configuration, k, c)
-
-    @classmethod
-    def of_matrices(cls, configuration: Configuration, k: csr_array, c: csr_array) -> "Motion":
-        """Of K and C of all coordinates, which are assembled already."""
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         active = active[np.argsort(active % len(configuration), kind="stable")]
@@ -141,11 +129,11 @@ class Motion:
         return self.damping.nnz > 0
 
     @cached_property
-    def energy_norm(self) -> EnergyNorm:
+    def energy_norm(self) -> SimpleNamespace:
         """The coordinates in which the energy is a sum of squares."""
-        return EnergyNorm.of(self.stiffness.toarray())
+        return energy_norm(self.stiffness.toarray())
 
     @property
     def first_order(self) -> Floats:
         """Z, the dense matrix of the first-order system in coordinates of the energy, shape (2E, 2E), 1 / time."""
-        return self.energy_norm.first_order(self.stiffness.toarray(), self.damping.toarray())
+        return matrix_in_norm(self.energy_norm, self.stiffness.toarray(), self.damping.toarray())

@@ -20,15 +20,15 @@ contacts is stable, and rest where the packing with sliding contacts is unstable
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS. A
-`Look` says what motions did in a span of time. Without a contact that remembers the motion is linear, and the
-exponential function of the first-order matrix gives the motion to rounding.
+The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS.
+Without a contact that remembers the motion is linear, and the exponential function of the first-order matrix gives the
+motion to rounding.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,8 +53,8 @@ VERDICT_STEP = 0.3
 """The same where a verdict is wanted: D then is right to 2 %, rates of growth to 3 %, in a third of the time of 0.1."""
 
 CHUNK, LOOKS_PER_CHUNK = 300, 10
-"""Stable time steps between two looks at whether a motion has settled, some ten periods of a slow mode; and the looks
-that these have."""
+"""Stable time steps between two looks at whether a motion has settled, some ten periods of a slow mode; and the rows of
+numbers that are kept of these."""
 
 WORK_OF_MOTION = 2e11
 """Multiplications with entries of the operators that one motion may take: three minutes."""
@@ -64,20 +64,11 @@ PUSH_OVER_RESIDUAL = 10.0
 and to a hundredth where the two displacements have nothing in common."""
 
 
-@dataclass
-class OneSidedState:
-    """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
-    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
-
-    time: float
-    z: Floats
-    v: Floats
-    p: Floats
-    r: Floats
-
-
 class OneSidedSystem:
     """The equations of one configuration, in mass-weighted coordinates.
+
+    A state has several motions, in columns: `time`, displacement `z` and velocity `v`, shape (E, P), and what contacts
+    remember: `p` of sliders, shape (B, P), and `r`, shape (R, P), of contacts with two derivatives.
 
     Parameters
     ----------
@@ -135,15 +126,15 @@ class OneSidedSystem:
         """Whether motion is linear: no contact at the bound, and none with two derivatives."""
         return not self.excess.shape[0] and not self.rates.shape[0]
 
-    def start(self, velocity: Floats) -> OneSidedState:
-        """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
+    def start(self, velocity: Floats) -> SimpleNamespace:
+        """The state at rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
         v = self.motion.root_mass[:, None] * velocity[self.motion.active]
         p, r = (np.zeros((matrix.shape[0], v.shape[1])) for matrix in (self.excess, self.rates))
-        return OneSidedState(0.0, np.zeros_like(v), v, p, r)
+        return SimpleNamespace(time=0.0, z=np.zeros_like(v), v=v, p=p, r=r)
 
     def steps(
-        self, state: OneSidedState, time_step: float, rise: Floats | None = None, constant: Floats | float = 0.0
-    ) -> Iterator[OneSidedState]:
+        self, state: SimpleNamespace, time_step: float, rise: Floats | None = None, constant: Floats | float = 0.0
+    ) -> Iterator[SimpleNamespace]:
         """One step of velocity Verlet after the other, each of which changes the state.
 
         Parameters
@@ -163,7 +154,7 @@ class OneSidedSystem:
             state.v += 0.5 * time_step * force
             yield state
 
-    def _force(self, state: OneSidedState, load: Floats | None) -> Floats:
+    def _force(self, state: SimpleNamespace, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         force = -(self._stiffness @ state.z)
         if self.motion.dissipative:
@@ -181,26 +172,13 @@ class OneSidedSystem:
             force -= self.grip @ np.maximum(state.p, whole)
         return np.asarray(force)
 
-    def advance(self, state: OneSidedState, time: float, share: float, rise: Floats | None = None) -> None:
+    def advance(self, state: SimpleNamespace, time: float, share: float, rise: Floats | None = None) -> None:
         """Go on to a time, in equal steps of no more than a share of the stable one; `rise` as of `steps`."""
         count = int(np.ceil((time - state.time) / (share * self.stable_step) - 1e-9))
         if count > 0:
             for _ in islice(self.steps(state, (time - state.time) / count, rise), count):
                 pass
             state.time = time
-
-    def advance_exactly(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
-        """As `advance`, of a linear motion: by the exponential of (z, v, t, 1), to rounding."""
-        a, g, (size, columns) = self.motion.stiffness, self.motion.damping, state.z.shape
-        omega = float(np.sqrt(abs(a).sum(axis=1).max(initial=0.0))) or 1.0  # so that both halves weigh as much
-        clock = csr_array([[0.0, 1.0], [0.0, 0.0]])  # of t and 1
-        for k in range(columns):
-            pull = csr_array(np.column_stack([np.zeros(size) if rise is None else rise[:, k], np.zeros(size)]))
-            system = block_array([[None, omega * eye_array(size), None], [-a / omega, -g, pull], [None, None, clock]])
-            before = np.concatenate([omega * state.z[:, k], state.v[:, k], [state.time, 1.0]])
-            after = expm_multiply((time - state.time) * csr_array(system), before)
-            state.z[:, k], state.v[:, k] = after[:size] / omega, after[size : 2 * size]
-        state.time = time
 
     def displacement(self, z: Floats) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates in columns."""
@@ -218,24 +196,10 @@ def fast(matrix: csr_array) -> Matrix:
     return matrix.toarray() if np.prod(matrix.shape) <= 150**2 else csr_array(matrix)
 
 
-class Look(NamedTuple):
-    """Motions in a span of time: when it ends; mean kinetic energies and largest D of the motions, shape (P,); p and r
-    at the end; and the smallest multiples of the motions that take a contact to another state, shape (P,), with the D
-    that these have there."""
-
-    time: float
-    energy: Floats
-    size: Floats
-    slid: Floats
-    paths: Floats
-    first: Floats
-    size_at_first: Floats
-
-
-def looks(
+def follow(
     system: OneSidedSystem, velocity: Floats, span: float, rise: Floats | None = None, beside: bool = False
-) -> Iterator[Look]:
-    """One look after the other, each at a span of motions that go on; every stable step is looked at.
+) -> Iterator[SimpleNamespace]:
+    """What motions have done so far, after one span of time after the other; every stable step is looked at.
 
     Parameters
     ----------
@@ -244,42 +208,54 @@ def looks(
     velocity : ndarray, shape (coordinates, P)
         Of the start.
     span : float
-        Time of a look.
+        Time, of which `LOOKS_PER_CHUNK` rows are kept.
     rise : ndarray, shape (E, P), optional
         Mass-weighted forces that rise, per time.
     beside : bool
         Whether two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
         residual forces.
+
+    Yields
+    ------
+    SimpleNamespace
+        Rows, one a look, L so far: `time`, shape (L,); mean kinetic energies `energy`, largest D `size`; `first`, the
+        smallest multiples of the motions that take a contact to another state, and `size_at_first`, their D there,
+        shape (L, P); and `slid` and `paths`, p and r at the end of the look, shapes (L, B, P) and (L, R, P).
     """
     if beside:
         velocity = np.hstack([velocity, np.zeros((len(velocity), 2))])
         rise = None if rise is None else np.hstack([rise, np.zeros((len(rise), 2))])
-    state = system.start(velocity)
+    state, rows = system.start(velocity), list[tuple[Floats | float, ...]]()
     constant = np.zeros_like(state.z)
     if beside:
         constant[:, -2:] = np.hstack([-(system.grip @ system.missing), system.residual_force])
+    span /= LOOKS_PER_CHUNK
     count, every = max(int(np.ceil(span / (VERDICT_STEP * system.stable_step) - 1e-9)), 1), round(1 / VERDICT_STEP)
+    names = "time", "energy", "size", "first", "size_at_first", "slid", "paths"
     while True:
-        steps = system.steps(state, span / count, rise, constant)
-        seen = []
+        steps, seen = system.steps(state, span / count, rise, constant), []
         for k in range(1, count + 1):
             next(steps)
             if k % every == 0 or k == count:
                 seen.append([each.copy() for each in (state.z, state.v, state.p, state.r)])
         z, v, p, r = (np.hstack(each) for each in zip(*seen, strict=True))
-        sizes = system.mean_square_displacement(z).reshape(len(seen), -1)
-        first = system.changes.first(z, v, p, r).reshape(len(seen), -1)
-        energy = np.sum(v**2, axis=0).reshape(len(seen), -1).mean(axis=0)
-        at = first.argmin(axis=0), np.arange(sizes.shape[1])
-        yield Look(state.time, energy, sizes.max(axis=0), state.p.copy(), state.r.copy(), first[at], sizes[at])
+        size, first, energy = (
+            each.reshape(len(seen), -1)
+            for each in (system.mean_square_displacement(z), system.changes.first(z, v, p, r), np.sum(v**2, axis=0))
+        )
+        at = first.argmin(axis=0), np.arange(size.shape[1])
+        row = energy.mean(axis=0), size.max(axis=0), first[at], size[at], state.p.copy(), state.r.copy()
+        rows.append((state.time, *row))
+        if len(rows) % LOOKS_PER_CHUNK == 0:
+            yield SimpleNamespace(**dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True)))
 
 
-def least_scale(seen: list[Look]) -> float:
+def least_scale(seen: SimpleNamespace) -> float:
     """The multiple of some motions from which on neither what contacts lack to the bound nor residual forces count, by
-    looks `beside` the motions; infinite if residual forces alone take a contact to another state."""
-    if min(look.first[-1] for look in seen) < 1:
+    their first looks, `beside` them; infinite if residual forces alone take a contact to another state."""
+    if seen.first[:LOOKS_PER_CHUNK, -1].min() < 1:
         return np.inf
-    size = np.max([look.size for look in seen], axis=0)
+    size = seen.size[:LOOKS_PER_CHUNK].max(axis=0)
     return PUSH_OVER_RESIDUAL * float(np.sqrt(size[-2:].max() / size[:-2].min())) if size[-2:].any() else 0.0
 
 
@@ -354,8 +330,8 @@ def one_sided_motion(
     pull = np.asarray(system.weight.T @ load)
     least, most, end = 0.0, np.inf, min(CHUNK * system.stable_step, float(time[-1]))
     if end:
-        beginning = list(islice(looks(system, push, end / LOOKS_PER_CHUNK, pull, beside=True), LOOKS_PER_CHUNK))
-        least, most = least_scale(beginning), float(min(look.first[0] for look in beginning))
+        beginning = next(follow(system, push, end, pull, beside=True))
+        least, most = least_scale(beginning), float(beginning.first[:, 0].min())
     flies = c.coordinate_free.copy()
     flies[active] = False
     free = np.array([push, load / c.coordinate_mass[:, None]]) * flies[:, None]
@@ -364,7 +340,7 @@ def one_sided_motion(
     state, seen = system.start(push), []
     for each in time:
         if system.remembers_nothing:
-            system.advance_exactly(state, float(each), pull)
+            _advance_exactly(system.motion, state, float(each), pull)
         else:
             system.advance(state, float(each), MOTION_STEP, pull)
         most = min(most, float(system.changes.first(state.z, state.v, state.p, state.r)[0]))
@@ -376,6 +352,17 @@ def one_sided_motion(
         seen.append((*moved, state.p[:, 0].copy()))
     moved_by, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
     return OneSidedMotion(time, moved_by, speed, slid, (least, most))
+
+
+def _advance_exactly(motion: Motion, state: SimpleNamespace, time: float, rise: Floats) -> None:
+    """Go on to a time, of one linear motion: by the exponential of (z, v, t, 1), to rounding."""
+    a, g, size = motion.stiffness, motion.damping, len(state.z)
+    omega = float(np.sqrt(abs(a).sum(axis=1).max(initial=0.0))) or 1.0  # so that both halves weigh as much
+    pull, clock = csr_array(np.hstack([rise, 0 * rise])), csr_array([[0.0, 1.0], [0.0, 0.0]])  # of t and 1
+    system = block_array([[None, omega * eye_array(size), None], [-a / omega, -g, pull], [None, None, clock]])
+    before = np.concatenate([omega * state.z[:, 0], state.v[:, 0], [state.time, 1.0]])
+    after = expm_multiply((time - state.time) * csr_array(system), before)
+    state.z, state.v, state.time = after[:size, None] / omega, after[size : 2 * size, None], time
 
 
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:

@@ -28,7 +28,8 @@ particles move on at a constant mean velocity.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from ..arrays import Floats
 from ..configuration import Configuration
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
-from .one_sided import CHUNK, LOOKS_PER_CHUNK, VERDICT_STEP, WORK_OF_MOTION, Look, OneSidedSystem, least_scale, looks
+from .one_sided import CHUNK, LOOKS_PER_CHUNK, VERDICT_STEP, WORK_OF_MOTION, OneSidedSystem, follow, least_scale
 from .rising_load import static_response
 
 PUSHES = 2
@@ -67,84 +68,23 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
 
 def _followed(
     system: OneSidedSystem, pushes: int, chunks: int, time: float | None, beside: bool = False
-) -> Iterator[list[Look]]:
-    """All looks so far at the motions after random pushes, chunk by chunk, up to the time or as many as may be."""
+) -> Iterator[SimpleNamespace]:
+    """The motions after random pushes so far, chunk by chunk, up to the time or as many as may be."""
     usual, push = CHUNK * system.stable_step, random_pushes(system.configuration, pushes)
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * (2 * pushes + 2 * beside)
     most = int(np.clip(WORK_OF_MOTION / (entries * CHUNK / VERDICT_STEP), 4, chunks))
     if time is not None:  # whoever gives more time sees what a shorter run sees, too
         most = max(4, int(np.ceil(time / usual)))
         usual = time / most
-    seen: list[Look] = []
-    for look in looks(system, push, usual / LOOKS_PER_CHUNK, beside=beside):
-        seen.append(look)
-        if len(seen) % LOOKS_PER_CHUNK == 0:
-            report_progress(f"motion after pushes: t = {look.time:.4g}, D = {look.size[: 2 * pushes].max():.3g} push^2")
-            yield seen
-        if len(seen) >= most * LOOKS_PER_CHUNK:
-            return
-
-
-@dataclass(frozen=True)
-class OneSidedOutcome(FieldsByName):
-    """What became of one-sided motion after some pushes.
-
-    Attributes and items are the same: `outcome.grows` is `outcome["grows"]`.
-
-    Attributes
-    ----------
-    grows : bool or None
-        None if the motion has not settled.
-    growth_rate : float or None
-        Of D, 1 / time: of the motion that grows, or with sticking contacts if it rests; None if it has not settled.
-    error : float or None
-        Error of the growth rate of a motion that grows.
-    searched : float
-        Growth rate of D, 1 / time, below which growth may not have been seen; 0 where `grows` is known.
-    needed : float or None
-        After which time `grows` may be known: as D gains at its rate, or as the slowest vibration decays. None where
-        `grows` is known, or this time is over.
-    amplification, least_amplification : float
-        Largest D over the mean square velocity of the push along an axis, time^2: the largest and the smallest of
-        the pushes. Motion that goes on may take D further.
-    slip_left : float or None
-        How much of their slip contacts may have still to come, as a share; None if that is not known.
-    slides_on : int
-        Where the motion has not settled: contacts that slide on at a constant velocity or faster.
-    wears : bool
-        Whether vibration wears contacts down, so that they may slide again.
-    time : float
-        How long the motion was followed.
-    pushes : int
-        How many pushes, the opposite of each among them.
-    scales : tuple of float
-        Between which velocities of the push along an axis this holds for each of these pushes. Below, contacts that
-        count as at the bound do not reach it, or the residual forces move the packing as well; above, other contacts
-        reach the bound, open or close, or the force of one at the bound turns. The first is infinite if the residual
-        forces alone do so.
-    changes_at : float or None
-        Where the motion grows: D at which the first contact changes.
-    """
-
-    grows: bool | None
-    growth_rate: float | None
-    error: float | None
-    searched: float
-    needed: float | None
-    amplification: float
-    least_amplification: float
-    slip_left: float | None
-    slides_on: int
-    wears: bool
-    time: float
-    pushes: int
-    scales: tuple[float, float]
-    changes_at: float | None
+    for seen in islice(follow(system, push, usual, beside=beside), most):
+        largest = seen.size[-1, : 2 * pushes].max()
+        report_progress(f"motion after pushes: t = {seen.time[-1]:.4g}, D = {largest:.3g} push^2")
+        yield seen
 
 
 def follow_pushes(
     system: OneSidedSystem, sticking: float, may_rest: bool, time: float | None = None, pushes: int = PUSHES
-) -> OneSidedOutcome:
+) -> FieldsByName:
     """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
 
     Parameters
@@ -157,52 +97,69 @@ def follow_pushes(
         How long; until the motion has settled by default.
     pushes : int
         How many; the opposite of each is followed, too.
+
+    Returns
+    -------
+    FieldsByName
+        `grows`: True, False, or None if the motion has not settled. `growth_rate` of D, 1 / time, of the motion that
+        grows, with its `error`, or with sticking contacts if it rests. `searched`: growth rate of D, 1 / time, below
+        which growth may not have been seen; 0 where `grows` is known. `needed`: after which time it may be known, as D
+        gains at its rate, or as the slowest vibration decays.
+
+        `amplification` and `least_amplification`: largest D over the mean square velocity of the push along an axis,
+        time^2, of all `pushes`, the opposite of each among them. `slip_left`: how much of their slip contacts may have
+        still to come, as a share. `slides_on`: contacts that slide on at a constant velocity or faster, where the
+        motion has not settled. `wears`: whether vibration wears contacts down, so that they may slide again. `time`:
+        how long the motion was followed.
+
+        `scales`: between which velocities of the push along an axis this holds for each of these pushes. Below,
+        contacts that count as at the bound do not reach it, or the residual forces move the packing as well; above,
+        other contacts reach the bound, open or close, or the force of one at the bound turns. The first is infinite if
+        the residual forces alone do so. `changes_at`: where the motion grows, D at which the first contact changes.
     """
     grows, left, long_enough = None, np.inf, 1.99 * CHUNK * system.stable_step
     for seen in _followed(system, pushes, 120, time, beside=True):
-        if len(seen) < 2 * LOOKS_PER_CHUNK:
+        energy, size, first = (each[:, :-2] for each in (seen.energy, seen.size, seen.first))
+        slid, end = seen.slid[:, :, :-2], float(seen.time[-1])
+        if len(energy) < 2 * LOOKS_PER_CHUNK:
             continue
-        if not np.all(seen[-1].energy[:-2] <= GROWN_ENERGY * seen[0].energy[:-2]):
+        if not np.all(energy[-1] <= GROWN_ENERGY * energy[0]):
             grows = True
-        elif may_rest and seen[-1].time > long_enough and (now := _slip_left(seen)) <= STILL_SHARE:
+        elif may_rest and end > long_enough and (now := _slip_left(slid)) <= STILL_SHARE:
             grows, left = False, now
         if grows or (time is None and grows is False):
             break
-    times, energy = np.array([look.time for look in seen]), np.array([look.energy[:-2] for look in seen])
-    size, first = np.array([look.size for look in seen])[:, :-2], np.array([look.first for look in seen])[:, :-2]
-    (rate, error), end = _rate(times, energy), float(times[-1])
-    needed, slides_on, at_growth = 0.0, 0, np.inf
+    (rate, error), needed, slides_on, at_growth = _rate(seen.time, energy), 0.0, 0, np.inf
     if grows is None:
         gained = float(np.log(energy[-1] / energy[0]).max())
         grown, rested = np.log(GROWN_ENERGY) - gained, 2 * np.log(STILL_SHARE)
         needed = float(end + grown / rate if rate > 0 else rested / sticking if sticking else 0.0)
-        late = [seen[k * len(seen) // 4].slid[:, :-2] for k in (2, 3)] + [seen[-1].slid[:, :-2]]
-        before, after = np.diff(late, axis=0) + np.finfo(float).tiny
+        quarters = [2 * len(slid) // 4, 3 * len(slid) // 4, -1]
+        before, after = np.diff(slid[quarters], axis=0) + np.finfo(float).tiny
         goes_on = (0.9 * before < after) & (after < 1.5 * before)  # faster, it may grow
         slides_on = int(goes_on.any(axis=1).sum()) if end > long_enough else 0
     elif grows:
-        at_growth = min((look.first[:-2] ** 2 * look.size_at_first[:-2]).min() for look in seen[-LOOKS_PER_CHUNK:])
-    return OneSidedOutcome(
+        at_growth = float((first[-LOOKS_PER_CHUNK:] ** 2 * seen.size_at_first[-LOOKS_PER_CHUNK:, :-2]).min())
+    return FieldsByName(
         grows=grows, growth_rate=rate if grows else (sticking if grows is False else None),
         error=error if grows else None, searched=float(np.log(GROWN_ENERGY) / end) if grows is None else 0.0,
         needed=needed if end < needed < np.inf else None, amplification=float(size.max()),
         least_amplification=float(size.max(axis=0).min()),
         slip_left=left if grows is False and np.isfinite(left) else None, slides_on=slides_on,
-        wears=bool(len(seen[0].paths)), time=end, pushes=size.shape[1],
-        scales=(least_scale(seen[:LOOKS_PER_CHUNK]), float(first.min())),
-        changes_at=float(at_growth) if np.isfinite(at_growth) else None,
+        wears=bool(seen.paths.shape[1]), time=end, pushes=size.shape[1],
+        scales=(least_scale(seen), float(first.min())), changes_at=at_growth if np.isfinite(at_growth) else None,
     )  # fmt: skip
 
 
-def _slip_left(seen: list[Look]) -> float:
-    """Slip still to come as a share of all slip, the largest of the pushes, by looks at equal times; infinite if not
-    known.
+def _slip_left(slid: Floats) -> float:
+    """Slip still to come as a share of all slip, the largest of the pushes, by p at equal times, shape (L, B, P);
+    infinite if not known.
 
     Slips of all contacts in the last three of four quarters of the time fall by at most a ratio, and go on to.
     """
-    places = [0, len(seen) // 4, len(seen) // 2, 3 * len(seen) // 4, len(seen) - 1]
-    whole = np.array([seen[place].slid[:, :-2].sum(axis=0) for place in places])
-    steps, small = np.diff(whole, axis=0)[1:], np.finfo(float).eps * len(seen[0].slid) * whole[-1]
+    count = len(slid)
+    whole = slid[[0, count // 4, count // 2, 3 * count // 4, -1]].sum(axis=1)
+    steps, small = np.diff(whole, axis=0)[1:], np.finfo(float).eps * slid.shape[1] * whole[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.max(np.where(steps[1:] <= small, 0.0, steps[1:] / steps[:-1]), axis=0)
         left = np.where(ratio < 1, steps[-1] * ratio / (1 - ratio), np.inf)
@@ -221,46 +178,12 @@ def _rate(times: Floats, energy: Floats) -> tuple[float, float]:
     return mean, float(np.hypot(abs(slopes[1] - slopes[0]) / 2, 0.03 * mean))
 
 
-@dataclass(frozen=True)
-class Creep(FieldsByName):
-    """How far vibration carries particles whose contacts have two derivatives.
-
-    Attributes
-    ----------
-    amplification : float
-        Largest D of this displacement over the mean square velocity of the push along an axis, time^2.
-    time : float
-        How long motion was followed.
-    velocity, least_velocity : float
-        Root mean square over the particles of its mean velocity in the last quarter of this time, over the root mean
-        square velocity of the push along an axis.
-    limit : float or None
-        `amplification` that vibration may reach later, while the slowest motion decays; None if that is not known, as
-        without dissipation.
-    grows : bool or None
-        Whether the motion grew, in spite of linear motion that does not; None if its energy has risen, and less.
-    growth_rate : float
-        Of D, 1 / time, of a motion that grows.
-    """
-
-    amplification: float
-    time: float
-    velocity: float
-    least_velocity: float
-    limit: float | None
-    grows: bool | None
-    growth_rate: float
-
-    @property
-    def settled(self) -> bool:
-        """Whether little is left to come."""
-        return self.limit is not None and self.limit <= (1 + CREEP_LEFT) ** 2 * self.amplification
-
-
 def follow_creep(
     system: OneSidedSystem, pushes: int = PUSHES, time: float | None = None, decay: float = 0.0, free: int = 0
-) -> Creep:
-    """Follow the motion after random pushes and their opposites until little creep is left to come.
+) -> FieldsByName:
+    """How far vibration carries particles whose contacts have two derivatives: `Stability.creep`.
+
+    Random pushes and their opposites are followed until little is left to come.
 
     Parameters
     ----------
@@ -274,22 +197,35 @@ def follow_creep(
         -Re s of the slowest motion, 1 / time; 0 if that is not known, or nothing decays.
     free : int
         Motions that no force opposes.
+
+    Returns
+    -------
+    FieldsByName
+        `amplification`: largest D of this displacement over the mean square velocity of the push along an axis, time^2,
+        within the `time` that motion was followed. `velocity` and `least_velocity`: root mean square over the particles
+        of its mean velocity in the last quarter of this time, over that of the push. `limit`: `amplification` that
+        vibration may reach later, while the slowest motion decays; None if that is not known, as without dissipation.
+        `settled`: whether little is left to come. `grows`: whether the motion grew, in spite of linear motion that does
+        not, and its `growth_rate`; None if its energy has risen, and less.
     """
     for seen in _followed(system, pushes, CREEP_CHUNKS if decay else CREEP_CHUNKS // 8, time):
-        if len(seen) < 4 * LOOKS_PER_CHUNK:
+        count = len(seen.time)
+        if count < 4 * LOOKS_PER_CHUNK:
             continue
-        before, after = seen[3 * len(seen) // 4 - 1], seen[-1]  # the paths that overlaps have gone
-        moved = static_response(system.motion, system.wear @ np.hstack([before.paths, after.paths]), free)
-        early, late = np.split(moved, 2, axis=1)
-        sizes = system.mean_square_displacement(late)
-        velocity = np.sqrt(system.mean_square_displacement(late - early)) / (after.time - before.time)
+        quarter = 3 * count // 4 - 1
+        paths = np.hstack([seen.paths[quarter], seen.paths[-1]])  # the paths that overlaps have gone
+        early, late = np.split(static_response(system.motion, system.wear @ paths, free), 2, axis=1)
+        sizes, end = system.mean_square_displacement(late), float(seen.time[-1])
+        velocity = np.sqrt(system.mean_square_displacement(late - early)) / (end - seen.time[quarter])
         limit = float(((np.sqrt(sizes) + velocity / decay) ** 2).max()) if decay > 0 else None
-        times, energy = np.array([look.time for look in seen]), np.array([look.energy for look in seen])
-        gained = float(np.max(energy[-1] / energy[0]))
+        settled = limit is not None and limit <= (1 + CREEP_LEFT) ** 2 * float(sizes.max())
+        gained = float(np.max(seen.energy[-1] / seen.energy[0]))
         # the energy of a push is all kinetic at first, and half of it later
         grows = True if not gained <= GROWN_ENERGY else None if gained > 2 else False
-        rate = _rate(times, energy)[0] if grows else 0.0
-        found = Creep(float(sizes.max()), after.time, float(velocity.max()), float(velocity.min()), limit, grows, rate)
-        if grows or (found.settled and time is None):
+        if grows or (settled and time is None):
             break
-    return found
+    return FieldsByName(
+        amplification=float(sizes.max()), time=end, velocity=float(velocity.max()),
+        least_velocity=float(velocity.min()), limit=limit, settled=settled, grows=grows,
+        growth_rate=_rate(seen.time, seen.energy)[0] if grows else 0.0,
+    )  # fmt: skip

@@ -12,6 +12,16 @@ grow unseen as exp(g t) with
 
 .. math:: g = \frac2t \ln\frac{|u(t)|}\delta .
 
+**Oscillations are seen sooner.** Let :math:`l = (p, q)`, :math:`s = a + ib`, and let H be the antisymmetric part of G.
+Then :math:`p = (\bar s + G^T)\, q / \omega_0`. Real and imaginary part of :math:`l^H u(0)` are two normal numbers.
+Their density is at most :math:`1 / 2\pi d`, with :math:`d \ge |\mathrm{Im}\, p^H q| \ge (b - |H|)\, |q|^2 / \omega_0`.
+So :math:`|l^H u(0)|` is less than :math:`\delta` with a probability below :math:`\kappa\, \delta^2`,
+
+.. math:: \kappa = \frac{\omega_0^2 + (b + |G|)^2}{2\, \omega_0\, (b - |H|)} .
+
+(With a > 0 it is lower, as such motion has grown.) Where :math:`S > w^2` and :math:`G \ge 0`, all motion with a >= 0
+oscillates, with b >= w about: :math:`b^2 = a^2 + a g + \sigma`. Both are known from the signs of pivots.
+
 This holds for every :math:`\omega_0`. With a low :math:`\omega_0` :math:`|u|` falls soonest, since slow motions decay
 last. **One state serves best.** Of n states each may miss :math:`\delta^{1/n}`. The time until one has fallen so far is
 in proportion to :math:`\ln |u(0)| + \frac1n \ln \frac1\delta`, and n states cost n times that.
@@ -34,22 +44,41 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import eig, qr
-from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse import bsr_array, csc_array, csr_array, eye_array, hstack
 
 from ..arrays import Complexes, Floats
 from ..errors import BadInputError
-from ..factors.sparse_lu import SingularMatrixError, general_lu
+from ..factors.sparse_lu import SingularMatrixError, general_lu, negative_pivots
 from ..progress import report_progress
 from .eigenvalues import Linear
 from .motion import Motion
 from .stable_timestep import stable_timestep
 
 CHANCE = 1e-3
-"""delta: the probability that a motion which grows is overlooked."""
+"""The probability that a motion which grows is overlooked."""
+
+SEEN = 2 * np.log(CHANCE)
+"""ln delta^2 where motion that grows need not oscillate."""
+
+REFERENCE = 0.1
+"""omega_0 over the highest frequency: about that of the slowest motions, which are left in the end."""
+
+STEP = 0.8
+"""Of the largest stable step. In such steps dashpots have 0.6 of their effect on the fastest motion; s confirms growth.
+"""
+
+WORK = 2e12
+"""Multiplications with entries of A and G: some ten minutes."""
 
 
 def follow(
-    a: csr_array, g: csr_array, limit: float, state: Floats, looks: float, patience: float = np.inf
+    a: csr_array,
+    g: csr_array,
+    limit: float,
+    state: Floats,
+    looks: float,
+    patience: float = np.inf,
+    wanted: float = SEEN,
 ) -> tuple[Linear, float, float]:
     """Follow a motion until it has decayed, or grows.
 
@@ -65,6 +94,8 @@ def follow(
         How often a hundred steps are taken at the most.
     patience : float
         How many times that motion may need to decay: otherwise it is given up after a tenth.
+    wanted : float
+        ln |u|^2 at which motion has decayed.
 
     Returns
     -------
@@ -75,20 +106,27 @@ def follow(
     float
         After which time the motion may have decayed.
     """
-    # omega_0 is about that of the slowest motions that are left in the end
-    reference, step, wanted = 0.1 * 2 / limit, 0.6 * limit, 2 * np.log(CHANCE)
-    z, v, span, scale = state[:, 0] / reference, state[:, 1].copy(), 100 * step, 0.0
-    logs, needed = [float(np.log(reference**2 * (z @ z) + v @ v))], np.inf
+    reference, step, (both, block) = REFERENCE * 2 / limit, STEP * limit, _in_blocks(a, g)
+    x = np.stack([state[:, 0] / reference, state[:, 1]], axis=1).reshape(-1, block, 2).transpose(0, 2, 1).copy()
+    z, v, span, scale = x[:, 0], x[:, 1], 100 * step, 0.0
+
+    def force() -> Floats:
+        return np.asarray(both @ (x if g.nnz else z).ravel()).reshape(z.shape)
+
+    def square() -> float:
+        return float(reference**2 * np.vdot(z, z) + np.vdot(v, v))
+
+    logs, needed = [float(np.log(square()))], np.inf
     while len(logs) <= max(looks, 8):
         size = float(np.abs(v).max(initial=0.0)) or 1.0  # growth may be beyond all numbers
-        before, squares, scale = (z / size, v / size), [], scale + 2 * float(np.log(size))
-        z, v = before[0].copy(), before[1].copy()
-        v -= 0.5 * step * (a @ z + g @ v)
+        x /= size
+        before, squares, scale = x.copy(), [], scale + 2 * float(np.log(size))
+        v -= 0.5 * step * force()
         for k in range(1, 101):
             z += step * v
-            v -= (step if k < 100 else 0.5 * step) * (a @ z + g @ v)
+            v -= (step if k < 100 else 0.5 * step) * force()
             if k % 7 == 0:  # a mean, as |u|^2 of one motion oscillates; seven steps divide no period for long
-                squares.append(reference**2 * (z @ z) + v @ v)
+                squares.append(square())
         logs.append(scale + float(np.log(np.mean(squares))))
         now, after = span * (len(logs) - 1), np.array(logs[int(np.argmin(logs)) :])
         falls = _slope(logs, span)
@@ -99,7 +137,8 @@ def follow(
             coarse = _slope(list(after), span)
             # as the square of the time, by motion that no force opposes, this is 3; by so many decades it is 11
             if coarse * now > 8:
-                s, _, error = motion_near(a, g, _of_plane(a, g, before, (z, v)), z)
+                states = [(each[:, 0].ravel(), each[:, 1].ravel()) for each in (before, x)]
+                s, _, error = motion_near(a, g, _of_plane(a, g, *states), states[1][0])
                 if s.real > 10 * error:
                     at_least = coarse > 4 * s.real  # steps make up to a half of that
                     return Linear(False, 2 * s.real, 2 * error, s=s, at_least=at_least), now, np.inf
@@ -110,6 +149,19 @@ def follow(
         if len(logs) > max(0.1 * looks, 8) and needed > patience * looks * span:
             break
     return Linear(None, falls, searched=float(logs[-1] - wanted) / now), now, needed
+
+
+def _in_blocks(a: csr_array, g: csr_array) -> tuple[bsr_array, int]:
+    """[A G] with the columns of both side by side, block by block, and the size of a block: half the time of CSR."""
+    matrices, n = ([a, g] if g.nnz else [a]), a.shape[0]
+    both, entries = csr_array(hstack(matrices, format="csr")), sum(each.nnz for each in matrices)
+    for block in (6, 3, 1):
+        if n % block == 0:
+            columns = np.arange(len(matrices) * n).reshape(len(matrices), -1, block).transpose(1, 0, 2).ravel()
+            found = bsr_array(csr_array(both[:, columns]), blocksize=(block, len(matrices) * block))
+            if block == 1 or found.nnz <= 1.5 * entries:
+                break
+    return found, block
 
 
 def _of_plane(a: csr_array, g: csr_array, *states: tuple[Floats, Floats]) -> complex:
@@ -187,16 +239,11 @@ def fastest_growing(
     limit = 4 / (c + np.sqrt(c * c + 4 * k))  # stable for certain, by the largest sums of rows
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((size, 2))
     # k is twice the square of the largest frequency, or so
-    return follow(stiffness, g, limit, state, 10 * periods[1] * 2 * np.pi / np.sqrt(0.5 * k) / (60 * limit))[0]
+    return follow(stiffness, g, limit, state, 10 * periods[1] * 2 * np.pi / np.sqrt(0.5 * k) / (100 * STEP * limit))[0]
 
 
 def follow_decay(
-    motion: Motion,
-    kept: csr_array,
-    why: str,
-    time: float | None = None,
-    searched: float = np.inf,
-    work: float = 2e11,
+    motion: Motion, kept: csr_array, why: str, time: float | None = None, searched: float = np.inf, work: float = WORK
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 
@@ -213,21 +260,23 @@ def follow_decay(
     searched : float
         Growth rate of D, 1 / time, above which nothing grows, as is known already.
     work : float
-        Multiplications with entries of A and G; three minutes by default.
+        Multiplications with entries of A and G.
     """
     a, g, c, size = motion.stiffness, motion.damping, motion.configuration, len(motion.active)
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((size, 2))
-    state, free = kept @ (kept.T @ state), size - kept.shape[1]
+    state, common = kept @ (kept.T @ state), 0
     for axis in range(c.dimension):  # common motion along an axis on which no force opposes it
         along = (motion.active // len(c) == axis) * motion.root_mass
         if along.any() and np.abs(a @ along).max() <= 1e-12 * np.linalg.norm(along) * np.abs(a.data).max(initial=0.0):
+            along = kept @ (kept.T @ along)  # or what is left out would come in again, and grow as the time
             along /= np.linalg.norm(along)
             state -= np.outer(along, along @ state)
-            free += 1
-    limit = float(stable_timestep(c))
+            common += 1
+    limit, free = float(stable_timestep(c)), common + size - kept.shape[1]
+    wanted = _oscillating(csr_array(kept.T @ a @ kept), csr_array(kept.T @ g @ kept), common, REFERENCE * 2 / limit)
     # a step takes the time of 2e4 multiplications at the least
-    looks = work / (100 * (2e4 + a.nnz + g.nnz)) if time is None else time / (60 * limit)
-    found, now, needed = follow(a, g, limit, state, looks, 3.0 if time is None else np.inf)
+    looks = work / (100 * (2e4 + a.nnz + g.nnz)) if time is None else time / (100 * STEP * limit)
+    found, now, needed = follow(a, g, limit, state, looks, 1.0 if time is None else np.inf, wanted)
     if found.stable is not None:
         return replace(found, free=free)
     bound = min(searched, found.searched)
@@ -237,6 +286,21 @@ def follow_decay(
         f"state shows within t = {now:.4g}; {would}"
     )
     return replace(found, free=free, searched=bound, reasons=(reason,))
+
+
+def _oscillating(a: csr_array, g: csr_array, common: int, reference: float) -> float:
+    """ln delta^2 at which motion has decayed: higher where all that may grow oscillates."""
+    low, one = 0.1 * reference, eye_array(a.shape[0])
+    stiffest, strongest, gyration = (float(abs(each).sum(axis=1).max()) for each in (a, g, 0.5 * (g - g.T)))
+    if (
+        gyration > 0.1 * low
+        or negative_pivots(csc_array(0.5 * (a + a.T) - low**2 * one)) != common
+        or negative_pivots(csc_array(0.5 * (g + g.T) + 1e-6 * strongest * one)) != 0
+    ):
+        return SEEN
+    ends = np.array([0.9 * low, np.sqrt(stiffest) + gyration])  # the chance is convex in b
+    likelier = (reference**2 + (ends + strongest) ** 2) / (2 * reference * (ends - gyration))
+    return max(SEEN, float(np.log(CHANCE / likelier.max())))
 
 
 def _slope(logs: list[float], between: float) -> float:

@@ -33,15 +33,14 @@ for S, and the bound holds up to the time t.
 The same energy of the displacement by the residual forces says from which push on these do not count.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
-from ..arrays import Floats, Indices
+from ..arrays import Floats
 from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
+from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .motion import Motion
 from .one_sided import OneSidedSystem
@@ -56,32 +55,7 @@ OVERLAP_CHANGE = 0.1
 2.6 % after pushes of one particle and of all in twenty disks, of LAMMPS's own motion."""
 
 
-@dataclass(frozen=True)
-class PushBound:
-    """Up to which energy no contact changes.
-
-    Attributes
-    ----------
-    energy : float
-        Of a push, below which no contact changes; infinite if nothing can change.
-    gain : float
-        Bound of the largest gain of energy.
-    time : float
-        Up to which time this holds; infinite if for ever.
-    residual_energy : float
-        Energy of the displacement by the residual forces.
-    unsettled : ndarray of int
-        Numbers of the contacts that the residual forces alone may take to another state; -1 for a gap that closes.
-    """
-
-    energy: float
-    gain: float
-    time: float
-    residual_energy: float
-    unsettled: Indices
-
-
-def reach_of(system: OneSidedSystem, free: int = 0) -> PushBound | None:
+def reach_of(system: OneSidedSystem, free: int = 0) -> FieldsByName | None:
     """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
 
     Parameters
@@ -90,6 +64,14 @@ def reach_of(system: OneSidedSystem, free: int = 0) -> PushBound | None:
         Of a configuration without contacts at Coulomb's bound.
     free : int
         Motions that no force opposes.
+
+    Returns
+    -------
+    FieldsByName or None
+        `energy` of a push, below which no contact changes, infinite if nothing can change; `gain`, the bound of the
+        largest gain of energy; the `time` up to which this holds, infinite if for ever; `residual_energy` of the
+        displacement by the residual forces; `unsettled`, the numbers of the contacts that the residual forces alone may
+        take to another state, -1 for a gap that closes.
     """
     motion, step, changes = system.motion, system.stable_step, system.changes
     shift = (1 / (FREE_TIME * step)) ** 2 if free else 0.0
@@ -103,14 +85,15 @@ def reach_of(system: OneSidedSystem, free: int = 0) -> PushBound | None:
     gain, time = _gain(motion, symmetric, factors, step, FREE_TIME * step if free else np.inf)
     moved = factors.solve(system.residual_force)
     residual = 0.5 * float(np.sum(system.residual_force * moved))
-    if system.configuration.stiffness is not None:  # the bounds of contacts are not known
-        return PushBound(np.inf, gain, time, residual, np.zeros(0, int))
-    # a force that begins to act displaces twice as far as one at rest
-    multiples = changes.multiples(2 * moved, 0 * moved, np.zeros((0, 1)), np.abs(system.rates @ moved))
-    unsettled = np.flatnonzero(np.minimum(multiples.reaches, multiples.opens).min(axis=1) < 1)
-    if multiples.closes.min(initial=np.inf) < 1:
-        unsettled = np.append(unsettled, -1)
-    return PushBound(0.5 * _radius(system, factors) ** 2 / gain, gain, time, residual, unsettled)
+    energy, unsettled = np.inf, np.zeros(0, int)
+    if system.configuration.stiffness is None:  # otherwise the bounds of contacts are not known
+        energy = 0.5 * _radius(system, factors) ** 2 / gain
+        # a force that begins to act displaces twice as far as one at rest
+        multiples = changes.multiples(2 * moved, 0 * moved, np.zeros((0, 1)), np.abs(system.rates @ moved))
+        unsettled = np.flatnonzero(np.minimum(multiples.reaches, multiples.opens).min(axis=1) < 1)
+        if multiples.closes.min(initial=np.inf) < 1:
+            unsettled = np.append(unsettled, -1)
+    return FieldsByName(energy=energy, gain=gain, time=time, residual_energy=residual, unsettled=unsettled)
 
 
 def _radius(system: OneSidedSystem, factors: Factors) -> float:
@@ -176,25 +159,27 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     largest = float(np.abs(symmetric.data).max(initial=0.0))
     if float(np.abs(skew.data).max(initial=0.0)) <= 1e-12 * largest:
         return 1.0, end
-    if symmetric.shape[0] > 600:  # two seconds
-
-        def twice(x: Floats) -> Floats:
-            return np.asarray(skew.T @ factors.solve(skew @ x))
-
-        size = symmetric.shape[0]
+    size = symmetric.shape[0]
+    if size > 600:  # two seconds
+        twice = LinearOperator((size, size), lambda x: skew.T @ factors.solve(skew @ x), dtype=float)
         # of a crystal many are equal, and a start of ones has no part of them; two digits do
         start = np.random.default_rng(0).standard_normal(size)
-        operator = LinearOperator((size, size), twice, dtype=float)
-        found = eigsh(operator, 1, v0=start, tol=1e-2, return_eigenvectors=False)
+        found = eigsh(twice, 1, v0=start, tol=1e-2, return_eigenvectors=False)
         return float(np.exp(1.0)), min(end, float(1 / np.sqrt(1.02 * found[0])))
-    root = cholesky(symmetric.toarray())  # R with R^T R = S: p = R z
-    size = len(root)
+    root, stiffness = cholesky(symmetric.toarray()), motion.stiffness.toarray()  # R with R^T R = S: p = R z
     if not motion.dissipative and np.isinf(end):
-        return _gain_of_modes(motion.stiffness.toarray(), root), end
-    z = np.zeros((2 * size, 2 * size))
-    z[:size, size:] = root
-    z[size:, :size] = -solve_triangular(root, motion.stiffness.toarray().T, trans="T").T
-    z[size:, size:] = -motion.damping.toarray()
+        # the energies of the modes of A are constant, each by itself, and their sum is E but for two factors, with
+        # weights with which left and right vectors are as long
+        values, x = eig(stiffness)
+        inverse = np.linalg.inv(x)
+        weight = np.sqrt(np.linalg.norm(inverse, axis=1) / np.linalg.norm(x, axis=0))
+        outward, inward, omega = x / weight, weight[:, None] * inverse, np.sqrt(np.abs(values))
+        back = solve_triangular(root, inward.T, trans="T").T
+        larger = max(np.linalg.norm(outward, 2), np.linalg.norm(root @ outward / omega, 2))
+        smaller = max(np.linalg.norm(inward, 2), np.linalg.norm(omega[:, None] * back, 2))
+        return float((larger * smaller) ** 2), end
+    push = -solve_triangular(root, stiffness.T, trans="T").T
+    z = np.block([[np.zeros((size, size)), root], [push, -motion.damping.toarray()]])
     fastest = float(eigh(0.5 * (z + z.T), eigvals_only=True, subset_by_index=(2 * size - 1, 2 * size - 1))[0])
     time, one = 0.25 * step, expm(0.25 * step * z)
     two = one @ one
@@ -210,19 +195,6 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
             break
         time, one, two = 2 * time, two, two @ two
     return float(after**2), min(end, 4 * time)
-
-
-def _gain_of_modes(stiffness: Floats, root: Floats) -> float:
-    """Without dissipation: the energies of the modes of A are constant, each by itself, and their sum is E but for two
-    factors, with weights with which left and right vectors are as long."""
-    values, x = eig(stiffness)
-    inverse = np.linalg.inv(x)
-    weight = np.sqrt(np.linalg.norm(inverse, axis=1) / np.linalg.norm(x, axis=0))
-    outward, inward, omega = x / weight, weight[:, None] * inverse, np.sqrt(np.abs(values))
-    back = solve_triangular(root, inward.T, trans="T").T
-    larger = max(np.linalg.norm(outward, 2), np.linalg.norm(root @ outward / omega, 2))
-    smaller = max(np.linalg.norm(inward, 2), np.linalg.norm(omega[:, None] * back, 2))
-    return float((larger * smaller) ** 2)
 
 
 def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:

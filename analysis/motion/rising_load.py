@@ -25,10 +25,10 @@ times as far. If another contact changes before, there is no motion of this kind
 then moves on until other contacts bear this.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import count, islice
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,12 @@ from .eigenvalues import operator_rounding, zero_uncertainty
 from .linear import linear_verdict
 from .motion import Motion
 from .one_sided import PUSH_OVER_RESIDUAL, WORK_OF_MOTION, OneSidedSystem
+
+Window = tuple[Floats | float, ...]
+"""Of a span of time: its length; what changes of mass-weighted displacements, shape (E, S), of the paths of overlaps of
+contacts with two derivatives, (R, S), and of p of contacts at the bound, (B, S); and integrals of the particles'
+velocities and of their squares, (N, d, S), both by the same samples, so that the vibration, which is the root of a
+difference, has their digits. Each is the sum of those of the parts of the span."""
 
 LOAD_STEP = 0.1
 """Time step of motion under a load, as a share of the largest stable one."""
@@ -71,112 +77,6 @@ class NotFollowedError(FaultgougeError):
     """The motion under a load that rises has no constant drift and no vibration about it."""
 
 
-@dataclass(frozen=True)
-class DriftAndVibration(FieldsByName):
-    """Motion from one start, over the rate of loading; attributes and items are the same.
-
-    Attributes
-    ----------
-    drift, vibration : float
-        Root mean squares over particles and axes of the mean velocity, and of what is left of the velocities.
-    drift_error, vibration_error : float or None
-        Their errors; None if too few windows were followed.
-    steady : bool
-        Whether the motion goes on as it is.
-    """
-
-    drift: float
-    drift_error: float | None
-    vibration: float
-    vibration_error: float | None
-    steady: bool
-
-    @property
-    def known(self) -> bool:
-        """Whether the motion vibrates steadily, with a vibration that is known to a tenth."""
-        precise = self.vibration_error is not None and self.vibration_error <= 0.1 * self.vibration
-        return self.steady and self.vibration > VIBRATION_SHARE * self.drift and precise
-
-    def vibrates_like(self, other: "DriftAndVibration") -> bool:
-        """Whether the motion from another start is steady as well, or neither is, and vibrates as much."""
-        least, most = sorted((self.vibration, other.vibration))
-        alike = most - least <= HALVES_DIFFERENCE * most or most <= VIBRATION_SHARE * self.drift
-        return self.steady is other.steady and alike
-
-    def __str__(self) -> str:
-        errors = [f" \u00b1 {error:.1g}" if error else "" for error in (self.drift_error, self.vibration_error)]
-        known = f"drift {self.drift:.3g}{errors[0]}, vibration {self.vibration:.3g}{errors[1]}"
-        return known + ("" if self.steady else ", not steady yet")
-
-
-@dataclass(frozen=True)
-class RisingMotion(DriftAndVibration):
-    """Motion under a load that rises, over the rate of loading; attributes and items are the same.
-
-    Attributes
-    ----------
-    drift, vibration, drift_error, vibration_error, steady
-        As `DriftAndVibration` has them.
-    time : float or None
-        How long the motion was followed; None if it was solved for.
-    span : float or None
-        The last part of this time, of which drift and vibration are.
-    other_start : DriftAndVibration or None
-        The motion from another start, if one was followed.
-    least_rise : float
-        Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
-        load has moved the packing ten times as far as the residual forces do.
-    next_change : float or None
-        Increase of the load at which the first other contact changes.
-    next_event : str or None
-        What this contact does: it reaches the bound, opens, closes, or turns its force at the bound.
-    """
-
-    time: float | None = None
-    span: float | None = None
-    other_start: DriftAndVibration | None = None
-    least_rise: float = 0.0
-    next_change: float | None = None
-    next_event: str | None = None
-
-
-class Span(NamedTuple):
-    """Sums over a span of time, of motions from S starts.
-
-    Attributes
-    ----------
-    time : float
-        Its length.
-    displacement : ndarray, shape (E, S)
-        Mass-weighted displacement.
-    paths : ndarray, shape (R, S)
-        Paths of the overlaps of contacts with two derivatives: sums of the sizes of their changes.
-    velocities, squares : ndarray, shape (N, d, S)
-        Integrals of the particles' velocities, and of their squares, both by the same samples: so the vibration, which
-        is the root of a difference, has their digits, and not half of those of the sampling.
-    slid : ndarray, shape (B, S)
-        Growth of p of contacts at the bound, force.
-    """
-
-    time: float
-    displacement: Floats
-    paths: Floats
-    velocities: Floats
-    squares: Floats
-    slid: Floats
-
-    @classmethod
-    def joined(cls, windows: Sequence["Span"]) -> "Span":
-        """Of windows that follow each other."""
-        return cls(**{name: sum(getattr(each, name) for each in windows) for name in cls._fields})
-
-    def drift_and_vibration(self, system: OneSidedSystem) -> Floats:
-        """Root mean squares over particles and axes, shape (2, S)."""
-        mean = system.displacement(self.displacement) / self.time
-        left = np.maximum(self.squares / self.time - (self.velocities / self.time) ** 2, 0.0)
-        return np.asarray(np.sqrt([np.mean(each, axis=(0, 1)) for each in (mean**2, left)]))
-
-
 def motion_under_load(
     system: OneSidedSystem,
     direction: Floats,
@@ -185,7 +85,7 @@ def motion_under_load(
     free: int = 0,
     decays: bool = True,
     residual: float = 0.0,
-) -> RisingMotion:
+) -> FieldsByName:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
     Parameters
@@ -203,6 +103,18 @@ def motion_under_load(
     residual : float
         Root mean square displacement of the particles by the residual forces, length.
 
+    Returns
+    -------
+    FieldsByName
+        `drift` and `vibration`: root mean squares over particles and axes of the mean velocity, and of what is left of
+        the velocities, over the rate of loading; `drift_error` and `vibration_error`, None if too few windows were
+        followed; `steady`: whether the motion goes on as it is. `time`: how long it was followed, None if it was solved
+        for, and `span`, the last part of this time, of which drift and vibration are. `other_start`: these five numbers
+        of the motion from another start, if one was followed. `least_rise`: increase of the load from which on contacts
+        that count as at Coulomb's bound have reached the bound, and the load has moved the packing ten times as far as
+        the residual forces do. `next_change` and `next_event`: increase of the load at which the first other contact
+        changes, and what it does.
+
     Raises
     ------
     NotFollowedError
@@ -219,11 +131,12 @@ def motion_under_load(
     velocity = _steady_velocity(system, load, free) if decays and not len(system.missing) else None
     if velocity is None:
         span, found = _followed(system, load, time)
+        velocity, paths, slid = (np.asarray(each)[:, :1] / span[0] for each in span[1:4])
     else:
-        moves, nothing = system.displacement(velocity), np.zeros((0, 1))
-        span = Span(1.0, velocity, np.abs(system.rates @ velocity), moves, moves**2, nothing)
-        found = RisingMotion(float(span.drift_and_vibration(system)[0, 0]), 0.0, 0.0, 0.0, True)
-    velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
+        paths, slid = np.abs(system.rates @ velocity), np.zeros((0, 1))
+        found = {"drift": float(np.sqrt(np.mean(system.displacement(velocity) ** 2))), "drift_error": 0.0}
+        found |= {"vibration": 0.0, "vibration_error": 0.0, "steady": True}
+        found |= {"time": None, "span": None, "other_start": None}
     counts = slid > 0.1 * slid.max(initial=0.0)
     reached = float((system.missing[counts] / slid[counts]).max(initial=0.0))
     change, event = next_change(system, velocity, slid, paths)
@@ -236,7 +149,7 @@ def motion_under_load(
             f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
             "bring the packing to rest more closely"
         )
-    return replace(found, least_rise=least, next_change=change, next_event=event)
+    return FieldsByName(**found, least_rise=least, next_change=change, next_event=event)
 
 
 def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats | None:
@@ -284,7 +197,7 @@ def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
     return moved
 
 
-def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple[Span, RisingMotion]:
+def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple[Window, dict[str, Any]]:
     """The last part of a motion that is followed, and its drift and vibration."""
     length = WINDOW * system.stable_step
     entries = system.motion.stiffness.nnz + system.motion.damping.nnz
@@ -292,15 +205,20 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
     if time is not None:
         most = max(16, int(np.ceil(time / length)))
         length = time / most
-    windows: list[Span] = []
+    windows: list[Window] = []
     for window in islice(windows_under_load(system, load, length), most):
         windows.append(window)
-        seen, now = window.drift_and_vibration(system)[1].max(), length * len(windows)
+        seen, now = means_of_windows(system, [window])[1].max(), length * len(windows)
         report_progress(f"under the rising load: t = {now:.4g}, vibration {seen:.3g}")
-        if not seen < 1e12 * windows[0].drift_and_vibration(system).max():
+        if not seen < 1e12 * means_of_windows(system, windows[:1]).max():
             raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by 1e12")
-        if time is None and 2 * len(windows) >= most and all(each.known for each in _of_starts(system, windows)[1]):
-            break
+        if time is None and 2 * len(windows) >= most:
+            known = [
+                each.steady and each.vibration > VIBRATION_SHARE * each.drift and each.vibration_error is not None
+                and each.vibration_error <= 0.1 * each.vibration for each in _of_starts(system, windows)[1]
+            ]  # fmt: skip
+            if all(known):
+                break
     after = windows[FADE_WINDOWS:] or windows
     quarters = _in_parts(system, after)[0, 3:, 0]
     # the middles of two quarters; of particles whose dashpots alone bear the load the mean velocity rises as the time,
@@ -313,10 +231,11 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
             "on, or where the packing is slower than that: give more time"
         )
     span, (one, *others) = _of_starts(system, windows)
-    return span, RisingMotion(**one, time=now, span=span.time, other_start=others[0] if others else None)
+    whole: Window = tuple(sum(each) for each in zip(*span, strict=True))
+    return whole, {**one, "time": now, "span": whole[0], "other_start": others[0] if others else None}
 
 
-def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Span]:
+def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Window]:
     """One window after the other under a load that rises, from two starts: with a drag on all coordinates, and on all
     but rotations, as one packing may vibrate in two ways. Large packings, and bodies, whose coordinates are of another
     kind, have one start.
@@ -338,22 +257,30 @@ def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> I
         drag = np.hstack([drag, ~spins])
     starts = drag.shape[1]
     state, load = system.start(np.zeros((c.coordinates, starts))), np.repeat(load, starts, axis=1)
+    samples, velocities = 400, np.zeros((2, len(c), c.dimension, starts))
     for number in count():
-        place, way, slid = state.z.copy(), state.r.copy(), state.p.copy()
-        velocities, squares = np.zeros((2, *system.displacement(place).shape))
-        samples = 400
-        for sample in range(samples):
-            now = number + (sample + 1) / samples
+        begin = [each.copy() for each in (state.z, state.r, state.p)]
+        velocities[:] = 0.0
+        for sample in range(1, samples + 1):
+            now = number + sample / samples
             system.advance(state, length * now, LOAD_STEP, load)
             state.v *= np.exp(-DRAG / samples * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
             velocity = system.displacement(state.v)
-            velocities += velocity
-            squares += velocity**2
-        share = length / samples
-        yield Span(length, state.z - place, state.r - way, share * velocities, share * squares, state.p - slid)
+            velocities += np.array([velocity, velocity**2])
+        moved = [after - before for after, before in zip((state.z, state.r, state.p), begin, strict=True)]
+        yield (length, *moved, *(length / samples * velocities))
 
 
-def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[DriftAndVibration]]:
+def means_of_windows(system: OneSidedSystem, windows: list[Window]) -> Floats:
+    """Root mean squares over particles and axes, of a span of windows, shape (2, S)."""
+    time, moved, _, _, velocities, squares = (sum(each) for each in zip(*windows, strict=True))
+    left = np.maximum(squares / time - (velocities / time) ** 2, 0.0)
+    return np.asarray(
+        np.sqrt([np.mean(each, axis=(0, 1)) for each in ((system.displacement(moved) / time) ** 2, left)])
+    )
+
+
+def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Window], list[FieldsByName]]:
     """The longest span that is steady from every start, or the last half; and what each start does in this span."""
     after = windows[FADE_WINDOWS:] or windows[-1:]
     for span, differs in ((after, TREND), (after[len(after) // 2 :], HALVES_DIFFERENCE)):
@@ -367,23 +294,22 @@ def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[
                 and vibration <= 2 * VIBRATION_SHARE * drift
             )
             # of the mean of four, doubled, since quarters of a slow cycle are not independent
-            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0]).tolist()  # and of time steps
-            errors = spread if np.all(np.isfinite(parts)) else [None, None]
-            steady = bool(alike or vanishes)
-            found.append(DriftAndVibration(float(drift), errors[0], float(vibration), errors[1], steady))
+            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0])  # and of time steps
+            drift_error, vibration_error = spread.tolist() if np.all(np.isfinite(parts)) else (None, None)
+            found.append(FieldsByName(
+                drift=float(drift), drift_error=drift_error, vibration=float(vibration),
+                vibration_error=vibration_error, steady=bool(alike or vanishes),
+            ))  # fmt: skip
         if all(each.steady for each in found):
             break
-    return Span.joined(span), found
+    return span, found
 
 
-def _in_parts(system: OneSidedSystem, span: list[Span]) -> Floats:
-    """Drift and vibration of a span, of its two halves and of its four quarters, shape (S, 7, 2)."""
-    size = len(span)
-    edges = [0, size // 4, size // 2, 3 * size // 4, size]
-    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))]
-    if size < 8:  # too few to compare parts
-        slices = slices[:1]
-    parts = np.array([Span.joined(span[edges[a] : edges[b]]).drift_and_vibration(system) for a, b in slices])
+def _in_parts(system: OneSidedSystem, span: list[Window]) -> Floats:
+    """Drift and vibration of a span, its two halves and its four quarters, shape (S, 7, 2); nan of too few windows."""
+    edges = [k * len(span) // 4 for k in range(5)]
+    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))][: 7 if len(span) >= 8 else 1]
+    parts = np.array([means_of_windows(system, span[edges[a] : edges[b]]) for a, b in slices])
     return np.pad(parts, ((0, 7 - len(parts)), (0, 0), (0, 0)), constant_values=np.nan).transpose(2, 0, 1)
 
 

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, derive_frozen
 from ..counted import counted
+from ..fields_by_name import FieldsByName
 from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
@@ -38,7 +39,7 @@ from .pushes import PUSHES, follow_creep, follow_pushes
 from .reach import change_of_growing, reach_of
 from .rising_load import NotFollowedError, motion_under_load, static_response
 from .spectrum import Spectrum, spectrum
-from .verdict import Stability, WithoutDissipation
+from .verdict import Stability
 
 LARGE = 6000
 """Coordinates beyond which one push and its opposite stand for several, and K's spectrum is not computed."""
@@ -94,14 +95,12 @@ def stability(
     direction = None if rise is None else forces_on_coordinates(c, rise)
     if direction is not None and not direction[c.coordinate_free].any():
         raise ValueError("rise is a force on no particle that moves: give the forces by which the load rises.")
-    motion, contacts, given = Motion.of(c), c.contacts, c.stiffness is not None
+    motion, contacts, given, doubts = Motion.of(c), c.contacts, c.stiffness is not None, (*reasons, *no_verdict(c))
     undamped, sticking = _linear_motion(motion, known, time)
-    sided = bool(contacts.one_sided.any())
+    sided, touching = bool(contacts.one_sided.any()), contacts.touching
     sliding = linear_verdict(Motion.of(c, sliding=True), decides=False) if sided else sticking
     # where K is given, contacts, as far as they are known, have no derivatives
-    touching = contacts.touching
     count = max(len(touching), len(c) - len(c.rattlers)) if given else len(touching)
-    doubts = (*reasons, *no_verdict(c))
     found = Stability(
         stable=None if doubts or not count else sticking.stable, growth_rate=sticking.growth_rate,
         error=sticking.error, at_least=sticking.at_least, undamped=undamped, at_bound=int(touching.at_bound.sum()),
@@ -119,7 +118,7 @@ def stability(
     return follow(found) if follow is not None and found.stable is False else found
 
 
-def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -> tuple[WithoutDissipation, Linear]:
+def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -> tuple[FieldsByName, Linear]:
     """Of sticking contacts: what grows without dissipation, and with it. K's spectrum decides where there is none."""
     c, damped = motion.configuration, motion.configuration.damped
     if known is None and c.coordinates <= (2000 if damped else LARGE):
@@ -127,43 +126,39 @@ def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -
     if known is None:
         alone = Motion.of(c, dissipation=False) if damped else motion
         sticking = linear_verdict(alone, decides=not damped, time=time)
-        undamped = WithoutDissipation(max(sticking.growth_rate, 0.0), None, None, sticking.at_least)
+        counts = {"pairs": None, "negative": None}
     else:
-        undamped = WithoutDissipation(known.growth_rate(), len(known.pairs), len(known.negative))
         roots = 1j * np.sqrt(known.unstable.astype(complex))
         s = complex(max(np.where(roots.real < 0, -roots, roots), key=np.real, default=0j))
-        sticking = Linear(not len(roots), undamped.growth_rate, 0.0, known.free, s)
+        sticking = Linear(not len(roots), known.growth_rate(), 0.0, known.free, s)
+        counts = {"pairs": len(known.pairs), "negative": len(known.negative)}  # type: ignore[dict-item]
+    rate = max(sticking.growth_rate, 0.0)
+    undamped = FieldsByName(growth_rate=rate, **counts, at_least=sticking.at_least)
     return undamped, linear_verdict(motion, time=time) if damped else sticking
 
 
 def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dict[str, Any]:
     """What else is to be said of linear motion: where growth ends, up to which push the verdict holds, and creep."""
-    c, motion = system.configuration, system.motion
+    c, motion, told = system.configuration, system.motion, dict[str, Any]()
     if found.stable is False:
         return {"first_change": change_of_growing(system, found.sticking.s) if found.sticking.s else None}
     if found.stable is None:
         return {}
-    told: dict[str, Any] = {}
     if (reach := reach_of(system, found.free)) is not None:
         mass = motion.root_mass[motion.active < c.dimension * len(c)] ** 2
-        bounded = bool(np.isfinite(reach.energy))
-        told = {
-            "largest_energy": reach.energy if bounded else None,
-            "largest_push": float(np.sqrt(2 * reach.energy / mass.max())) if bounded else None,
-            "push_time": reach.time if np.isfinite(reach.time) else None,
-            "residual_push": float(np.sqrt(2 * reach.residual_energy / mass.min())),
-        }
+        if np.isfinite(reach.energy):
+            told = {"largest_energy": reach.energy, "largest_push": float(np.sqrt(2 * reach.energy / mass.max()))}
+        told["push_time"] = reach.time if np.isfinite(reach.time) else None
+        told["residual_push"] = float(np.sqrt(2 * reach.residual_energy / mass.min()))
         if len(reach.unsettled):
             bears = np.isin(np.arange(len(c.contacts)), reach.unsettled, invert=True)
-            force = c.contacts.normal_force
+            force, without = c.contacts.normal_force, derive_frozen(c, contacts=c.contacts.chosen(bears))
             # by Hertz's law the stiffness of such a contact is a tenth of that of others
-            if np.any(force[~bears] > 1e-3 * force.mean()):
+            weak = not np.any(force[~bears] > 1e-3 * force.mean())
+            if not weak or linear_verdict(Motion.of(without), time=time).stable is not True:
                 return told | {"stable": None, "reasons": (UNSETTLED,)}
-            without = Motion.of(derive_frozen(c, contacts=c.contacts.chosen(bears)))
-            if linear_verdict(without, time=time).stable is not True:
-                return told | {"stable": None, "reasons": (UNSETTLED,)}
-            weak = f"{counted(len(reach.unsettled), 'contact')} of next to no force"
-            remark = f"the residual forces alone change {weak}, without which the verdict is the same"
+            few = f"{counted(len(reach.unsettled), 'contact')} of next to no force"
+            remark = f"the residual forces alone change {few}, without which the verdict is the same"
             told["remarks"] = (*found.remarks, remark)
     if system.remembers_nothing or c.stiffness is not None:
         return told
@@ -173,8 +168,7 @@ def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dic
         told |= {"stable": False, "growth_rate": creep.growth_rate}
     elif creep.grows is None:
         rises = f"its energy has risen within t = {creep.time:.4g}; whether this goes on was not followed"
-        says = f"vibration wears contacts down, and {rises}"
-        told |= {"stable": None, "reasons": (says,)}
+        told |= {"stable": None, "reasons": (f"vibration wears contacts down, and {rises}",)}
     return told | {"creep": creep}
 
 
@@ -182,7 +176,8 @@ def _after_pushes(found: Stability, system: OneSidedSystem, time: float | None) 
     """The verdict on one-sided motion; unknown, too, if it is the motion after no push of any size."""
     pushes = 1 if system.configuration.coordinates > LARGE else PUSHES
     outcome = follow_pushes(system, found.growth_rate, found.sticking.stable is not False, time, pushes)
-    (least, most), reasons, told = outcome.scales, found.sticking.reasons, dict[str, Any]()
+    (least, most), reasons = outcome.scales, found.sticking.reasons
+    told = {"one_sided": outcome, "first_change": outcome.changes_at}
     if outcome.grows is None and outcome.slides_on:
         slide = f"{counted(outcome.slides_on, 'contact')} at Coulomb's bound slide{'s' * (outcome.slides_on == 1)}"
         why = f"{slide} on after a push, and within t = {outcome.time:.4g} neither to rest nor faster and faster"
@@ -195,7 +190,7 @@ def _after_pushes(found: Stability, system: OneSidedSystem, time: float | None) 
         )
         reasons = (why,)
     elif outcome.grows:
-        reasons, told = (), {"at_least": False}
+        reasons, told["at_least"] = (), False
         told |= {"growth_rate": outcome.growth_rate} if outcome.growth_rate else {}
         told |= {"error": outcome.error} if outcome.error else {}
     elif np.isinf(least):
@@ -207,22 +202,18 @@ def _after_pushes(found: Stability, system: OneSidedSystem, time: float | None) 
             "bring the packing to rest more closely"
         )
         reasons = (why,)
-    stable = None if reasons else not outcome.grows
-    return told | {"stable": stable, "reasons": reasons, "one_sided": outcome, "first_change": outcome.changes_at}
+    return told | {"stable": None if reasons else not outcome.grows, "reasons": reasons}
 
 
 def _rising(found: Stability, system: OneSidedSystem, direction: Floats, time: float | None) -> dict[str, Any]:
     """The motion under a rising load, or why it was not followed."""
-    if found.stable is False:
-        return {"not_followed": "small motion grows"}
-    if UNSETTLED in found.reasons:
-        return {"not_followed": UNSETTLED}
+    if found.stable is False or UNSETTLED in found.reasons:
+        return {"not_followed": UNSETTLED if found.stable is None else "small motion grows"}
     # a force that begins to act displaces twice as far as one at rest
     moved = 2 * static_response(system.motion, system.residual_force, found.free)
     residual = float(np.sqrt(system.mean_square_displacement(moved).max(initial=0.0)))
     decays = found.sticking.stable is True
     try:
-        rising = motion_under_load(system, direction, time, free=found.free, decays=decays, residual=residual)
+        return {"rising": motion_under_load(system, direction, time, free=found.free, decays=decays, residual=residual)}
     except NotFollowedError as error:
         return {"not_followed": str(error)}
-    return {"rising": rising}

@@ -181,12 +181,8 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
 
 def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
     """Upper bound of mu by the largest sums of rows, 1 / time."""
-    sums = [0.0, 0.0]
-    for k, matrix in enumerate((stiffness, damping)):
-        if matrix is not None:  # abs(matrix) would copy the indices, too
-            absolute = csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-            sums[k] = float(np.max(scale * (absolute @ scale)))
-    return 0.5 * (sums[1] + float(np.sqrt(sums[1] ** 2 + 4 * sums[0])))
+    k, c = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
+    return 0.5 * (c + float(np.sqrt(c**2 + 4 * k)))
 
 
 def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:

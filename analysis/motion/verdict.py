@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..counted import counted
+from ..fields_by_name import FieldsByName
 from .eigenvalues import Linear, exponential
 from .one_sided import PUSH_OVER_RESIDUAL
-from .pushes import Creep, OneSidedOutcome
-from .rising_load import RisingMotion
+from .rising_load import HALVES_DIFFERENCE, VIBRATION_SHARE
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
 """The sentence on contacts with two derivatives."""
@@ -20,26 +20,6 @@ ENDS = {"vibrates": "vibrates at", "creeps": "creeps on, at", "flows": "flows, a
 
 class NoVerdictError(ValueError):
     """Truth was asked of a verdict that is not known."""
-
-
-@dataclass(frozen=True)
-class WithoutDissipation:
-    """The motion without dissipation, of sticking contacts: the eigenvalues of K.
-
-    Attributes
-    ----------
-    growth_rate : float
-        Of D, 1 / time.
-    pairs, negative : int or None
-        Complex pairs, and negative eigenvalues; of large packings these are not counted.
-    at_least : bool
-        Whether the growth rate is only known to be no less.
-    """
-
-    growth_rate: float
-    pairs: int | None
-    negative: int | None
-    at_least: bool = False
 
 
 @dataclass(frozen=True)
@@ -55,8 +35,9 @@ class Stability:
         for rounding. Where contacts at the bound make the packing grow, the rate of the one-sided motion.
     at_least : bool
         Whether the growth rate is only known to be no less.
-    undamped : WithoutDissipation
-        Without dissipation.
+    undamped : FieldsByName
+        Without dissipation, of sticking contacts: `growth_rate` of D, 1 / time, `at_least` that or known; and how many
+        complex `pairs` and `negative` eigenvalues K has, None where these are not counted.
     at_bound : int
         Contacts at Coulomb's bound.
     rolling_at_bound : int
@@ -71,11 +52,12 @@ class Stability:
         Motions that no force opposes.
     contacts : int
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
-    one_sided : OneSidedOutcome or None
-        What became of motion after pushes; None without contacts that slide on one side. Its fields have two spellings,
-        `one_sided.grows` and `one_sided["grows"]`, as JSON has them; those of `creep` and `rising` have, too.
-    creep : Creep or None
-        How far a push carries particles if contacts have two derivatives, and none is at the bound.
+    one_sided : FieldsByName or None
+        What became of motion after pushes (:func:`~faultgouge.analysis.motion.pushes.follow_pushes`); None without
+        contacts that slide on one side. Its numbers have two spellings, `one_sided.grows` and `one_sided["grows"]`.
+    creep : FieldsByName or None
+        How far a push carries particles if contacts have two derivatives, and none is at the bound
+        (:func:`~faultgouge.analysis.motion.pushes.follow_creep`).
     largest_energy, largest_push : float or None
         Where linear motion does not grow, and no contact slides on one side: energy of a push below which no contact
         changes, whatever the push; and the velocity of one particle, whichever it is, with that energy: that of the
@@ -89,8 +71,10 @@ class Stability:
     follow : dict or None
         Where motion grows, and LAMMPS went on: "displacement", the root of D where it ends, and "ends", "vibrates",
         "creeps" or "flows".
-    rising : RisingMotion or None
-        Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
+    rising : FieldsByName or None
+        Drift and vibration over the rate of loading
+        (:func:`~faultgouge.analysis.motion.rising_load.motion_under_load`). None unless asked, and where the motion was
+        `not_followed`.
     reasons : tuple of str
         Why the verdict is unknown.
     not_followed : str
@@ -103,7 +87,7 @@ class Stability:
     growth_rate: float
     error: float
     at_least: bool
-    undamped: WithoutDissipation
+    undamped: FieldsByName
     at_bound: int
     sticking: Linear
     sliding: Linear
@@ -111,8 +95,8 @@ class Stability:
     dissipative: bool
     free: int
     contacts: int
-    one_sided: OneSidedOutcome | None = None
-    creep: Creep | None = None
+    one_sided: FieldsByName | None = None
+    creep: FieldsByName | None = None
     rolling_at_bound: int = 0
     largest_energy: float | None = None
     largest_push: float | None = None
@@ -120,7 +104,7 @@ class Stability:
     residual_push: float = 0.0
     first_change: float | None = None
     follow: dict[str, Any] | None = None
-    rising: RisingMotion | None = None
+    rising: FieldsByName | None = None
     reasons: tuple[str, ...] = ()
     not_followed: str = ""
     remarks: tuple[str, ...] = ()
@@ -139,11 +123,10 @@ class Stability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
-        parts = self._at_rest(), self._range(), self._beyond()
-        return (self._verdict(), *(each for part in parts for each in part), *self.remarks)
+        return (self._verdict(), *self._at_rest(), *self._range(), *self._beyond(), *self.remarks)
 
     def _verdict(self) -> str:
-        outcome = self.one_sided
+        outcome, said = self.one_sided, self.sticking.said
         free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
         rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
         if not self.contacts:
@@ -155,13 +138,14 @@ class Stability:
         if outcome is not None:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
-            known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
             size = as_known(outcome.least_amplification, outcome.amplification)
-            while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
-            reaches = f"D reaches {size} times the mean square velocity of the push {while_sliding}"
-            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {reaches}{known}"
-        if self.sticking.said:
-            return f"stable: {self.sticking.said}{free}"
+            return (
+                f"stable: each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square "
+                f"velocity of the push while contacts slide (followed for t = {outcome.time:.4g}{left})"
+                + (f"; with sticking contacts, {said}" if said else "")
+            )
+        if said:
+            return f"stable: {said}{free}"
         if self.dissipative and self.growth_rate < 0:
             return f"stable: every {'vibration' if self.creep else 'motion'} decays, the slowest with {rate}{free}"
         if self.creep and not self.dissipative:
@@ -170,15 +154,15 @@ class Stability:
 
     def _at_rest(self) -> Iterator[str]:
         """Without dissipation, with contacts at the bound, and with those that vibration wears down."""
-        u, sided = self.undamped, self.one_sided is not None or self.sliding != self.sticking
+        u, creep, sided = self.undamped, self.creep, self.one_sided is not None or self.sliding != self.sticking
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
             yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
         if self.at_bound or self.rolling_at_bound:
-            lone = self.at_bound + self.rolling_at_bound == 1
             rolls = f", and the rolling friction of {self.rolling_at_bound} at its own" if self.rolling_at_bound else ""
-            slide = ": each slides on ahead and sticks on the way back" if sided else f" and slide{'s' * lone}"
+            slide = f" and slide{'s' * (self.at_bound + self.rolling_at_bound == 1)}"
+            slide = ": each slides on ahead and sticks on the way back" if sided else slide
             count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'}"
             yield f"{count} at Coulomb's bound{rolls}{slide}"
             if sided:
@@ -188,12 +172,9 @@ class Stability:
                     f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
                     f"slid on, {ever}{_neighbour(self.sliding)}"
                 )
-        if not self.stable:
-            return
-        creep = self.creep
-        if self.one_sided is not None and self.one_sided.wears:
+        if self.stable and self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
-        if creep is not None and self.dissipative:
+        if self.stable and creep is not None and self.dissipative:
             later = "" if creep.settled else ", and farther later"
             if not creep.settled and creep.limit is not None:
                 later = f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
@@ -201,7 +182,7 @@ class Stability:
                 f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
                 f"of the push within t = {creep.time:.4g}{later}"
             )
-        elif creep is not None:
+        elif self.stable and creep is not None:
             known = as_known(creep.least_velocity, creep.velocity)
             yield f"{WORN}: D as ({known} t)^2 times the mean square velocity of the push"
 
@@ -221,22 +202,12 @@ class Stability:
                     "contacts that count as at the bound reach it and residual forces do not count, up to "
                     f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
                 )
-        elif not self.stable:
-            return
-        elif most is None and not self.asymmetry:
-            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
-            says = "which push changes a contact, K by differences of forces does not say"
-            yield f"holds for small pushes{above if least else ''}: {says}"
-        elif most is None and not least:
-            yield "which push changes a contact is not known, since K's symmetric part is not positive"
-        elif most is None:
-            return
-        elif least >= most:
+        elif self.stable and most is not None and least >= most:
             yield (
                 f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
                 f"{most:.1g} a contact may open, close or slide"
             )
-        else:
+        elif self.stable and most is not None:
             below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
             within = f", until t = {self.push_time:.3g}" if self.push_time else ""
@@ -244,9 +215,16 @@ class Stability:
                 f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
                 f"{within}: no contact opens, closes or slides{worn}{below}"
             )
+        elif self.stable and not self.asymmetry:
+            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
+            says = "which push changes a contact, K by differences of forces does not say"
+            yield f"holds for small pushes{above if least else ''}: {says}"
+        elif self.stable and not least:
+            yield "which push changes a contact is not known, since K's symmetric part is not positive"
 
     def _beyond(self) -> Iterator[str]:
         """Where a motion that grows ends, and under a load that rises."""
+        rising = self.rising
         if self.stable is False and self.first_change is not None:
             size = self.first_change**0.5
             yield f"as it grows, the first contact changes at a displacement of {size:.2g} (root of D)"
@@ -255,25 +233,30 @@ class Stability:
             yield f"LAMMPS goes on from there, and {ends} a displacement of {size:.2g}"
         if self.not_followed:
             yield f"under a load that rises: not followed, since {self.not_followed}"
-        if self.rising is not None:
-            other, least, change = self.rising.other_start, self.rising.least_rise, self.rising.next_change
-            differs = other is not None and not self.rising.vibrates_like(other)
-            says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
-            slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
-            since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            event = f" (a contact {self.rising.next_event})"
-            until = "" if change is None else f"; until the load has risen by {change:.2g}{event}"
-            yield f"under a load that rises at the rate 1: {says}{since}{until}"
+        if rising is not None:
+            other, least, says = rising.other_start, rising.least_rise, _drift(rising)
+            if other is not None:
+                less, more = sorted((rising.vibration, other.vibration))
+                alike = more - less <= HALVES_DIFFERENCE * more or more <= VIBRATION_SHARE * rising.drift
+                if not alike or rising.steady is not other.steady:
+                    says += f", and from another start {_drift(other)}"
+            if least:
+                slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
+                says += f"; from a rise of {least:.1g} on, where {slide}residual forces do not count"
+            if rising.next_change:
+                says += f"; until the load has risen by {rising.next_change:.2g} (a contact {rising.next_event})"
+            yield f"under a load that rises at the rate 1: {says}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        found = {name: value for name, value in vars(self).items() if name not in ("dissipative", "contacts")}
-        for name in ("one_sided", "creep", "rising"):
-            found[name] = None if found[name] is None else found[name].as_dict()
-        for name in ("sticking", "sliding"):
-            found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
-        found |= {name: list(found[name]) for name in ("reasons", "remarks")}
-        return found | {"undamped": vars(self.undamped), "searched": self.sticking.searched}
+        found: dict[str, Any] = {}
+        for name, value in vars(self).items():
+            if isinstance(value, Linear):
+                found[name] = {key: each for key, each in asdict(value).items() if key != "s"}
+            elif name not in ("dissipative", "contacts"):
+                found[name] = value.as_dict() if isinstance(value, FieldsByName) else value
+        lists = {name: list(found[name]) for name in ("reasons", "remarks")}
+        return found | lists | {"searched": self.sticking.searched}
 
 
 def _neighbour(linear: Linear) -> str:
@@ -283,6 +266,13 @@ def _neighbour(linear: Linear) -> str:
     if linear.growth_rate == 0:
         return "D neither grows nor decays"
     return exponential(linear.growth_rate, 4, linear.at_least)
+
+
+def _drift(found: FieldsByName) -> str:
+    """Drift and vibration of one start."""
+    errors = [f" \u00b1 {error:.1g}" if error else "" for error in (found.drift_error, found.vibration_error)]
+    known = f"drift {found.drift:.3g}{errors[0]}, vibration {found.vibration:.3g}{errors[1]}"
+    return known + ("" if found.steady else ", not steady yet")
 
 
 def as_known(least: float, most: float) -> str:

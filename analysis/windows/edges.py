@@ -15,7 +15,6 @@ locates the jump. A mere crossing of two levels touches D = 0 without a change o
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -25,29 +24,15 @@ from ..errors import NoEquilibriumError
 from .motions import Motions, System, eigenvalues_near, overlap_near
 from .onset import Edge, Kind
 
+TrackPoint = tuple[float, Complexes, Complexes]
+"""A motion at one load: the load; the mean and D of two eigenvalues without dissipation, or s; and their slopes."""
+
 
 class DoubtError(Exception):
-    """The search cannot decide what happens on an increment; `fx` is a load inside at which to look, or None."""
-
-    def __init__(self, fx: float | None = None) -> None:
-        super().__init__("an increment is in doubt")
-        self.fx = fx
+    """The search cannot decide what happens on an increment; it may name a load inside at which to look."""
 
 
-class SignChange(NamedTuple):
-    """Where a function of the load changes its sign: a root, or a jump.
-
-    The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
-    that give the root, or the one that is the root, or the two on either side of the jump.
-    """
-
-    fx: float
-    error: float
-    loads: list[float]
-    smooth: bool
-
-
-def sign_change(value: Callable[[float], float], below: float, above: float) -> SignChange:
+def sign_change(value: Callable[[float], float], below: float, above: float) -> tuple[float, float, list[float], bool]:
     """Where a function of the load goes through zero, or jumps, between two loads at which it has opposite signs.
 
     A few steps bracket the root (Ridders, IEEE Trans. Circuits Syst. 26, 979 (1979)). Five points close to it then give
@@ -55,10 +40,18 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
     yet stand out of its scatter. Where it does not cross zero along a smooth line at any distance, bisection locates
     the jump. The root may be one of the two loads but for rounding, which may make the signs at both equal. The five
     points are then on its one side.
+
+    Returns
+    -------
+    fx, error : float
+        The root, with twice the scatter over the slope; or the jump, with half of its bracket.
+    loads : list of float
+        The five that give the root, or the one that is the root, or the two on either side of the jump.
+    smooth : bool
+        Whether it is a root.
     """
-    ends, span = (value(below), value(above)), above - below
-    last_place = float(np.spacing(max(abs(below), abs(above))))
-    values = {below: ends[0], above: ends[1]}
+    values, span = {below: value(below), above: value(above)}, above - below
+    ends, last_place = (values[below], values[above]), float(np.spacing(max(abs(below), abs(above))))
 
     def look_at(fx: float) -> float:
         if fx not in values:
@@ -76,8 +69,7 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
         if look_at(fx) == 0 or (steady and min(abs(fx - a), abs(b - fx)) > 0.01 * abs(b - a)):
             root = fx
         else:
-            places = sorted([a, b, middle, fx])
-            a, b = next((p, q) for p, q in pairwise(places) if look_at(p) * look_at(q) <= 0)
+            a, b = next((p, q) for p, q in pairwise(sorted([a, b, middle, fx])) if look_at(p) * look_at(q) <= 0)
     root = 0.5 * (a + b) if np.isnan(root) else root
 
     room, offsets = min(root - below, above - root), np.arange(-2.0, 3.0)
@@ -103,21 +95,19 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
             shift *= 1 - float(curve[2]) * shift / slope if abs(shift) <= 2 else 1
             found = root + shift * step
             if abs(found - root) <= distance:
-                known = loads if offsets[0] else [root]
-                return SignChange(found, 2 * scatter / abs(slope) * step + last_place, known, smooth=True)
+                return found, 2 * scatter / abs(slope) * step + last_place, loads if offsets[0] else [root], True
         if found != root and abs(found - root) < 0.5 * room:
             root = found  # the bracket was wider than the points
         else:
             distance *= 30.0
 
     if not crosses:
-        return SignChange(root, smaller / ((larger + smaller) / span) + last_place, [root], smooth=True)
-    width = max(1e-9 * span, 4 * last_place)  # paths differ by far more at a jump
+        return root, smaller / ((larger + smaller) / span) + last_place, [root], True
     left, right = next((a, b) for a, b in pairwise(sorted(values)) if values[a] * values[b] <= 0)
-    while right - left > width:
+    while right - left > max(1e-9 * span, 4 * last_place):  # paths differ by far more at a jump
         middle = 0.5 * (left + right)
         left, right = (middle, right) if look_at(middle) * values[left] > 0 else (left, middle)
-    return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
+    return 0.5 * (left + right), 0.5 * (right - left), [left, right], False
 
 
 def growth_of(numbers: Complexes) -> float:
@@ -125,24 +115,16 @@ def growth_of(numbers: Complexes) -> float:
     return float(-numbers[1].real if len(numbers) == 2 else numbers[0].real)
 
 
-class TrackPoint(NamedTuple):
-    """A motion at one load: the mean and D of two eigenvalues without dissipation, or s; and their slopes."""
-
-    fx: float
-    numbers: Complexes
-    slopes: Complexes
-
-    @classmethod
-    def of(cls, state: Motions, drift: Complexes, *members: int) -> "TrackPoint":
-        """One motion with dissipation; without it two real eigenvalues of a state, or one of a complex pair."""
-        values, slopes = state.values[list(members)], drift[list(members)]
-        if state.system.damping is not None:
-            return cls(state.system.fx, values, slopes)
-        if len(members) == 1:
-            values, slopes = (np.array([each[0], each[0].conj()]) for each in (values, slopes))
-        gap = values[0] - values[1]
-        numbers = np.array([values.mean(), gap**2])
-        return cls(state.system.fx, numbers, np.array([slopes.mean(), 2 * gap * (slopes[0] - slopes[1])]))
+def track_point(state: Motions, drift: Complexes, *members: int) -> TrackPoint:
+    """One motion with dissipation; without it two real eigenvalues of a state, or one of a complex pair."""
+    values, slopes = state.values[list(members)], drift[list(members)]
+    if state.system.damping is not None:
+        return state.system.fx, values, slopes
+    if len(members) == 1:
+        values, slopes = (np.array([each[0], each[0].conj()]) for each in (values, slopes))
+    gap = values[0] - values[1]
+    moves = np.array([slopes.mean(), 2 * gap * (slopes[0] - slopes[1])])
+    return state.system.fx, np.array([values.mean(), gap**2]), moves
 
 
 class Track:
@@ -152,33 +134,26 @@ class Track:
     ----------
     at : callable
         Load -> System.
-    below, above : TrackPoint
+    points : tuple of two TrackPoint
         The motion at the ends.
     """
 
-    def __init__(self, at: Callable[[float], System], below: TrackPoint, above: TrackPoint) -> None:
-        self.at, self.points = at, (below, above)
-        self.ends = below.fx, above.fx
-        self.known = {each.fx: each.numbers for each in self.points}
-        # slopes are values close by
-        step = 1e-4 * (above.fx - below.fx)
-        self._beside = {
-            each.fx + move: each.numbers + move * each.slopes
-            for each, move in zip(self.points, (step, -step), strict=True)
-        }
-        self.pairs = len(below.numbers) == 2
+    def __init__(self, at: Callable[[float], System], points: tuple[TrackPoint, TrackPoint]) -> None:
+        self.at, self.points, self.ends = at, points, (points[0][0], points[1][0])
+        self.known = {fx: numbers for fx, numbers, _ in points}
+        step = 1e-4 * (self.ends[1] - self.ends[0])  # slopes are values close by
+        moves = zip(points, (step, -step), strict=True)
+        self._beside = {fx + move: numbers + move * slopes for (fx, numbers, slopes), move in moves}
+        self.pairs = len(points[0][1]) == 2
 
     def numbers(self, fx: float) -> Complexes:
         """Its numbers at a load; a DoubtError if there is no equilibrium, or if the motion is not recognised."""
         known = {**self.known, **self._beside}
         if fx in known:
             return known[fx]
-        # by the polynomial through the nearest four loads
-        near: list[float] = []
+        near: list[float] = []  # by the polynomial through the nearest four loads; close ones are noise
         for load in sorted(known, key=lambda load: abs(load - fx)):
-            if len(near) < 4 and all(
-                abs(load - other) > 0.3 * abs(load - fx) for other in near
-            ):  # close ones are noise
+            if len(near) < 4 and all(abs(load - other) > 0.3 * abs(load - fx) for other in near):
                 near.append(load)
         weights = [np.prod([(fx - m) / (n - m) for m in near if m != n]) for n in near]
         expected = sum(weight * known[load] for weight, load in zip(weights, near, strict=True))
@@ -194,16 +169,16 @@ class Track:
         """Positive where the motion grows: -D, or Re s."""
         return growth_of(self.numbers(fx))
 
-    def edge(self, change: SignChange) -> Edge:
+    def edge(self, fx: float, error: float, loads: list[float], smooth: bool) -> Edge:
         """The edge where the growth changes its sign."""
-        middle = self.at(change.loads[len(change.loads) // 2])
-        mean = np.mean([self.numbers(fx)[0] for fx in change.loads])
+        middle = self.at(loads[len(loads) // 2])
+        mean = np.mean([self.numbers(load)[0] for load in loads])
         value = float(mean.real) if self.pairs else complex(mean)
         kind: Kind = "contact change"
-        if change.smooth:
+        if smooth:
             steady = 1e-9 * middle.frequency  # |Im s| that counts as zero
             kind = "coalescence" if self.pairs else "steady" if mean.imag <= steady else "hopf"
-        return Edge(change.fx, change.error + middle.balance, value, overlap_near(middle, value), kind)
+        return Edge(fx, error + middle.balance, value, overlap_near(middle, value), kind)
 
 
 def nearest_pair(values: Complexes, expected: Complexes) -> tuple[Complexes, list[int]]:

@@ -29,9 +29,6 @@ LAPACK_COORDINATES = 5000
 FEW_COORDINATES = 60
 """Coordinates up to which all motions take as long as to know which may grow."""
 
-WindowsSoFar = Callable[[tuple[Window, ...], float], None]
-"""Takes the windows so far, and the load up to which these are complete."""
-
 
 def check_increasing(forces: ArrayLike) -> Floats:
     """Loads as an array; ValueError if they are not at least two finite, increasing numbers."""
@@ -57,16 +54,14 @@ def windows_up_to(
     start = system(float(loads[0]))
     few = Quiet(decompose) if start.damping is not None and len(start.active) > FEW_COORDINATES else None
     for fx, windows in Search(system, narrowest, few, first, decompose).along(loads, look):
-        so_far = (
+        known = (
             f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
         )
-        report_progress(f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}{so_far}")
+        report_progress(f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}{known}")
         yield fx, windows
 
 
-def find_windows(
-    system: SystemOfLoad, forces: ArrayLike, *, known: WindowsSoFar = lambda windows, fx: None, **how: Any
-) -> tuple[Window, ...]:
+def find_windows(system: SystemOfLoad, forces: ArrayLike, **how: Any) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.
 
     Parameters
@@ -75,8 +70,6 @@ def find_windows(
         fx -> System, in coordinates that do not depend on the load.
     forces : array_like, shape (S,)
         The increasing loads.
-    known : callable, optional
-        Called after each increment with all windows so far, and with the load up to which these are complete.
     narrowest : float, optional
         Windows narrower than this are not looked for, force; by default 1e-7 of the largest load.
     look : callable, optional
@@ -96,9 +89,7 @@ def find_windows(
     ValueError
         If the loads are not at least two increasing numbers.
     """
-    windows: tuple[Window, ...] = ()
-    for fx, windows in windows_up_to(system, forces, **how):
-        known(windows, fx)
+    *_, (_, windows) = windows_up_to(system, forces, **how)
     return windows
 
 
@@ -129,9 +120,9 @@ def complex_windows(
     return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest)
 
 
-def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+def takes_all_modes(packing: HasConfiguration, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
-    return modes is None and packing.coordinates <= 3 * limits.all_windows
+    return packing.coordinates <= 3 * limits.all_windows
 
 
 def find_onset(
@@ -139,9 +130,7 @@ def find_onset(
     forces: ArrayLike,
     *,
     dissipation: bool = False,
-    modes: tuple[int, int] | None = None,
     first: bool = False,
-    known: Callable[[Onset, float], None] = lambda onset, fx: None,
     watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
@@ -166,23 +155,16 @@ def find_onset(
     dissipation : bool
         Whether the packing's own dashpots and drag count. The onset without dissipation is then also found:
         `Onset.undamped`.
-    modes : tuple of (int, int), optional
-        Search only these modes, and only for their first window. The two numbers are those of the first mode and of the
-        first mode beyond, by frequency from 0, of the symmetric part at the load of the search. Searches of several
-        parts, on several machines, together find the first window of all modes.
     first : bool
         Seek only the first window. No equilibrium beyond the increment in which it begins is then asked for. The end of
         the window is None if it lies beyond this increment.
-    known : callable, optional
-        Of a search with dissipation: called with the onset so far, and the load up to which it is complete, as soon as
-        there is a window, and after each increment from there on.
     watch : callable, optional
         Told in words which part of a large packing is being searched.
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
     folder : Path, optional
         Folder in which a search stores its results, slice by slice, if its bases are too large for memory. A search of
-        the same loads, operators and modes continues from there, to the bit. All ranks write to the folder.
+        the same loads and operators continues from there, to the bit. All ranks write to the folder.
 
     Returns
     -------
@@ -199,16 +181,14 @@ def find_onset(
     OutputError, DamagedSliceError
         If a file in the folder cannot be written, or read.
     ValueError
-        If the loads are not at least two increasing numbers, if the packing has none of the modes, or if it has no
-        dissipation although `dissipation` is set.
+        If the loads are not at least two increasing numbers, or if the packing has no dissipation although
+        `dissipation` is set.
     """
     loads = check_increasing(forces)
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    takes_all = takes_all_modes(start, modes, limits)
-    kept: dict[float, Motions] = {}
-    ends: list[float] = []
+    takes_all, ends, kept = takes_all_modes(start, limits), list[float](), dict[float, Motions]()
 
     def decompose(system: System) -> Motions:
         """All motions; those without dissipation are kept for the search with it, which begins with them."""
@@ -219,18 +199,18 @@ def find_onset(
             kept[system.fx] = found
         return found
 
-    def windows_of(system: SystemOfLoad, **how: Any) -> tuple[tuple[Window, ...], Increments]:
+    def windows_of(system: SystemOfLoad, look: Look = lambda below, above: ()) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if takes_all:
-            found = find_windows(system, loads, first=first, decompose=decompose, **how)
-            return found[:1] if first else found, ()
+            windows = find_windows(system, loads, look=look, first=first, decompose=decompose)
+            return windows[:1] if first else windows, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
-        window, doubtful = SlicedSearch(system, modes, ranks, folder, limits).first_window(loads)
+        window, doubtful = SlicedSearch(system, ranks, folder, limits).first_window(loads)
         return (window,) if window else (), doubtful
 
-    def damped(fx: float) -> System:
-        return System.of(start if fx == loads[0] else equilibrium(fx), True)
+    def at(fx: float) -> HasConfiguration:
+        return start if fx == loads[0] else equilibrium(fx)
 
     def negative_of(packing: HasConfiguration, system: System) -> Floats:
         """The negative eigenvalues; a positive symmetric part shows that there are none."""
@@ -238,7 +218,7 @@ def find_onset(
 
     def undamped(fx: float) -> System:
         """The branch of stable equilibria: it ends where one at a given load has a negative eigenvalue."""
-        packing = start if fx == loads[0] else equilibrium(fx)
+        packing = at(fx)
         system = System.of(packing)
         if fx in loads[1:] and len(negative_of(packing, system)):
             ends.append(fx)
@@ -248,46 +228,41 @@ def find_onset(
             )
         return system
 
-    def opened(eigenvalue: float, overlap: float) -> tuple[Window, ...]:
-        """A window that is open at the smallest load."""
-        return (Window(Edge(start.fx, 0.0, float(eigenvalue), overlap, "start"), None),)
-
     def undamped_onset() -> Onset:
-        windows: tuple[Window, ...] = ()
-        doubtful: Increments = ()
-        at_start: Spectrum | None = None
-        negative = negative_of(start, System.of(start))
+        windows, doubtful = (), ()  # type: tuple[Window, ...], Increments
+        negative, at_start, opened = negative_of(start, System.of(start)), None, None
         if len(negative):
             ends.append(start.fx)
-            windows = opened(negative[0], 1.0)
+            opened = float(negative[0]), 1.0
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        elif modes is None and (first or not takes_all) and not isinstance(start, Packing):
+        elif (first or not takes_all) and not isinstance(start, Packing):
             at_start = _complex_at_start(start)
-        if not windows and at_start is None:
+        if opened is None and at_start is None:
             try:
                 windows, doubtful = windows_of(undamped)
             except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-                at_start = _complex_at_start(start) if modes is None else None
+                at_start = _complex_at_start(start)
                 if at_start is None:
                     raise
-        if at_start is None and modes is None and windows and windows[0].kind == "start":
+        if at_start is None and (opened or (windows and windows[0].kind == "start")):
             at_start = spectrum(force_bearing(start)) if takes_all else _complex_at_start(start)
-        if at_start is not None and not (takes_all and windows) and not len(negative):
+        if opened is None and at_start is not None and not (takes_all and windows):
             fastest = max(at_start.pairs, key=lambda each: each.growth_rate)
-            windows = opened(fastest.eigenvalue.real, fastest.overlap)
+            opened = fastest.eigenvalue.real, fastest.overlap
+        if opened is not None:
+            windows = (Window(Edge(start.fx, 0.0, *opened, "start"), None),)
         if not windows:
-            raise OnsetError.among(modes, float(loads[-1]), doubtful)
+            raise OnsetError.of_search(float(loads[-1]), doubtful)
         complete = takes_all and not first and not windows[0].eigenvalue < 0
-        return Onset(windows, complete, doubtful, modes, at_start, min(ends, default=None))
+        return Onset(windows, complete, doubtful, at_start, min(ends, default=None))
 
     def undamped_onset_or_none() -> Onset | None:
         with suppress(OnsetError, NoEquilibriumError):
             return undamped_onset()
         return None
 
-    def told(windows: tuple[Window, ...], fx: float) -> None:
-        if windows and not first:
-            known(Onset(windows, undamped=beside), fx)
+    def damped(fx: float) -> System:
+        return System.of(at(fx), True)
 
     with show_progress(watch):
         if not dissipation:
@@ -295,20 +270,17 @@ def find_onset(
         if takes_all:
             report_progress(f"pairs that become complex without dissipation, up to F_x = {loads[-1]:.6g}")
             beside = undamped_onset_or_none()
-            windows, doubtful = windows_of(
-                damped, look=_inside(lambda fx: System.of(equilibrium(fx)), loads, beside), known=told
-            )
+            look = _inside(lambda fx: System.of(equilibrium(fx)), loads, beside)
+            windows, doubtful = windows_of(damped, look)
         else:
             with show_progress(what="with dissipation, "):
                 windows, doubtful = windows_of(damped)
-            if windows:
-                known(Onset(windows, False, doubtful), windows[0].fx_onset)
             with show_progress(what="without dissipation, "):
                 beside = undamped_onset_or_none()
         if not windows:
             finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
             raise NoGrowthError(finding, "raise the largest load", undamped=beside)
-        return Onset(windows, takes_all and not first, doubtful, modes, undamped=beside)
+        return Onset(windows, takes_all and not first, doubtful, undamped=beside)
 
 
 def _inside(undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> Look:
@@ -317,8 +289,7 @@ def _inside(undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> Look:
     Where the first window alone is known, the others are sought as far as the ramp is walked.
     """
     windows: tuple[Window, ...] = () if known is None else known.windows
-    reached = np.inf
-    walk: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
+    reached, walk = np.inf, iter(())  # type: float, Iterator[tuple[float, tuple[Window, ...]]]
     if known is not None and not known.complete:
         begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
         if begin < len(loads) - 1:

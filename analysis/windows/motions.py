@@ -108,11 +108,7 @@ class System:
         a, *g = (each.toarray() if issparse(each) else each for each in self.inner)
         if not g:
             return np.asarray(a)
-        size, unit = len(a), self.frequency
-        z = np.zeros((2 * size, 2 * size))
-        z[:size, size:] = unit * np.eye(size)
-        z[size:, :size], z[size:, size:] = -a / unit, -g[0]
-        return z
+        return np.block([[np.zeros_like(a), self.frequency * np.eye(len(a))], [-a / self.frequency, -g[0]]])
 
     @cached_property
     def rounding(self) -> float:
@@ -176,14 +172,13 @@ class Motions:
         found: list[tuple[Any, Any, Any]] = [(np.zeros(0, complex), none, none)]
         for point, count in points:
             inverse = Inverse(system, point)
-            values, right = inverse.eigenpairs(count)
-            others, left = inverse.eigenpairs(count, adjoint=True)
+            (values, right), (others, left) = (inverse.eigenpairs(count, adjoint) for adjoint in (False, True))
             apart = np.abs(values[:, None] - others.conj())
-            common = apart.min(axis=1) < 1e-5 * np.abs(values), apart.min(axis=0) < 1e-5 * np.abs(others)
-            if common[0].sum() != common[1].sum():
+            rows, columns = apart.min(axis=1) < 1e-5 * np.abs(values), apart.min(axis=0) < 1e-5 * np.abs(others)
+            if rows.sum() != columns.sum():
                 raise LinAlgError("right and left vectors differ in number")
-            values, right, left = values[common[0]], right[:, common[0]], left[:, common[1]]
-            found.append((values, right, left @ np.linalg.inv(left.conj().T @ right).conj().T))
+            right, left = right[:, rows], left[:, columns]
+            found.append((values[rows], right, left @ np.linalg.inv(left.conj().T @ right).conj().T))
         values, right, left = (np.concatenate(each, axis=-1) for each in zip(*found, strict=True))
         if system.damping is not None:
             right[:size] *= system.frequency  # to the vectors of Z, of displacements and velocities in one unit
@@ -259,22 +254,17 @@ def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexe
     -------
     ndarray of complex, shape (k,)
     """
-    parts = 1 if system.damping is None else 2
-    if parts * len(system.active) <= DENSE:
+    if (1 if system.damping is None else 2) * len(system.active) <= DENSE:
         return np.asarray(eigvals(system.first_order, check_finite=False))
     return Inverse(system, point).eigenpairs(count)[0]
 
 
 def overlap_near(system: System, value: complex) -> float:
     """|y^H x| of the motion next to a value, with dissipation |y^H (2 s + G) x| / |2 s|, by inverse iteration."""
-    inverse, vectors = Inverse(system, value), []
-    for adjoint in (False, True):
-        vector = np.random.default_rng(0).standard_normal(len(system.active))
-        for _ in range(4):
-            vector = inverse.solve(vector, adjoint)
-            vector = vector / np.linalg.norm(vector)
-        vectors.append(vector)
-    x, y = vectors
+    inverse = Inverse(system, value)
+    x = y = np.random.default_rng(0).standard_normal(len(system.active))
+    for _ in range(4):
+        x, y = (each / np.linalg.norm(each) for each in (inverse.solve(x), inverse.solve(y, True)))
     if system.damping is None:
         return float(abs(np.vdot(y, x)))
     return float(abs(np.vdot(y, 2 * inverse.shift * x + inverse.damping @ x)) / abs(2 * inverse.shift))
@@ -317,24 +307,22 @@ class Inverse:
         converge."""
         from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-        solve, damping, shift = self.solve, self.damping, self.shift
+        solve, damping, shift = self.solve, self.damping, np.conj(self.shift) if adjoint else self.shift
 
         def apply(state: Any) -> Any:
             if damping is None:
-                return solve(state, adjoint)
-            first, second = np.split(state, 2)
+                return solve(state.ravel(), adjoint)
+            first, second = np.split(state.ravel(), 2)
             if adjoint:
-                lower = -solve(first + np.conj(shift) * second, True)
-                return np.concatenate([second + damping.T @ lower + np.conj(shift) * lower, lower])
+                lower = -solve(first + shift * second, True)
+                return np.concatenate([second + damping.T @ lower + shift * lower, lower])
             upper = -solve(second + damping @ first + shift * first)
             return np.concatenate([upper, first + shift * upper])
 
         size, kind = (self.size, float) if damping is None else (2 * self.size, complex)
-        operator = LinearOperator((size, size), matvec=lambda state: apply(state.ravel()), dtype=kind)
         start = np.random.default_rng(0).standard_normal(size).astype(kind)
         try:
-            inverse, vectors = eigs(operator, k=min(count, size - 2), v0=start)
+            inverse, vectors = eigs(LinearOperator((size, size), apply, dtype=kind), min(count, size - 2), v0=start)
         except ArpackError as error:
             raise LinAlgError("the eigenvalues next to a point do not converge") from error
-        shift = np.conj(shift) if adjoint else shift
         return np.asarray(shift + 1 / inverse, complex), vectors

@@ -141,14 +141,13 @@ class OnsetError(FaultgougeError):
         return f"{self.finding}: {advice}." if advice else self.finding
 
     @classmethod
-    def among(cls, modes: tuple[int, int] | None, last: float, doubtful: Increments) -> "OnsetError":
-        """The error of a search among some modes, or all, up to the last load."""
-        none = "No pair of eigenvalues" + ("" if modes is None else f" among the modes {modes[0]}:{modes[1]}")
+    def of_search(cls, last: float, doubtful: Increments) -> "OnsetError":
+        """The error of a search up to the last load."""
         if not doubtful:
-            return cls(f"{none} is complex up to F_x = {last:.10g}", "raise the largest load")
+            return cls(f"No pair of eigenvalues is complex up to F_x = {last:.10g}", "raise the largest load")
         between = "between {:.10g} and {:.10g}".format(*doubtful[0])
-        finding = f"{none} was found to become complex up to F_x = {last:.10g}, but one was expected {between}"
-        return cls(finding, "raise the largest load", finer=True)
+        none = f"No pair of eigenvalues was found to become complex up to F_x = {last:.10g}"
+        return cls(f"{none}, but one was expected {between}", "raise the largest load", finer=True)
 
 
 class NoGrowthError(OnsetError):
@@ -180,8 +179,6 @@ class Onset(TableDisplay):
         `windows` has the first window.
     doubtful : tuple of (float, float)
         Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
-    modes : tuple of (int, int) or None
-        Modes among which the onset was sought; None for all.
     at_start : Spectrum or None
         The eigenvalues of a packing that is unstable at the smallest load already; None if it is stable there, or too
         large for all of its eigenvalues to be counted.
@@ -203,7 +200,6 @@ class Onset(TableDisplay):
     windows: tuple[Window, ...]
     complete: bool = True
     doubtful: Increments = ()
-    modes: tuple[int, int] | None = None
     at_start: Spectrum | None = None
     ends: float | None = None
     undamped: "Onset | None" = None
@@ -273,5 +269,4 @@ class Onset(TableDisplay):
         if start is not None:
             unstable = {"pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()}
         known |= {"complete": self.complete, "doubtful": doubtful}
-        known |= {"modes": None if self.modes is None else list(self.modes)}
-        return known | {"unstable_at_start": unstable, "branch_ends": self.ends}
+        return known | {"modes": None, "unstable_at_start": unstable, "branch_ends": self.ends}

@@ -1,9 +1,9 @@
 """One pair of modes through equilibria on the way to its onset: its normal form and its eigenvalues at each load."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -36,29 +36,15 @@ class Plane:
         right, left = (_plane(each[:, list(members)]) for each in (state.right, state.left))
         return cls(state.system, right, left)
 
-    @property
-    def fx(self) -> float:
-        """The load, force per top disk."""
-        return self.system.fx
-
-    def block_of(self, image: Any) -> Floats:
-        """(U^T V)^-1 U^T times the image of V under any matrix, shape (2, 2)."""
-        return np.asarray(np.linalg.solve(self.left.T @ self.right, self.left.T @ image))
-
     @cached_property
     def block(self) -> Floats:
-        """A on the planes, 1 / time^2."""
-        return self.block_of(self.system.stiffness @ self.right)
+        """(U^T V)^-1 U^T A V, shape (2, 2), 1 / time^2."""
+        return np.asarray(np.linalg.solve(self.left.T @ self.right, self.left.T @ (self.system.stiffness @ self.right)))
 
     @property
     def mean(self) -> float:
         """Half the trace of the block, 1 / time^2."""
         return 0.5 * float(np.trace(self.block))
-
-    @property
-    def traceless(self) -> Floats:
-        """The block less its mean, 1 / time^2."""
-        return np.asarray(self.block - self.mean * np.eye(2))
 
     @property
     def discriminant(self) -> float:
@@ -68,8 +54,8 @@ class Plane:
 
     def like(self, other: "Plane") -> bool:
         """Whether both have the same planes rather than not: all principal angles below 60 degrees."""
-        ends = (self.right, other.right), (self.left, other.left)
-        return min(float(np.linalg.norm(a.T @ b, -2)) for a, b in ends) > 0.5
+        cosines = (self.right.T @ other.right, self.left.T @ other.left)
+        return min(float(np.linalg.norm(each, -2)) for each in cosines) > 0.5
 
     def closest(self, state: Motions) -> list[int]:
         """One of a complex pair, or two real modes, that lie closest to these planes; ValueError of a single mode."""
@@ -116,13 +102,12 @@ def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalF
     list of NormalForm
         In the order of the packings.
     """
-    return [normal_form(pair) for pair in _follow_pair(packings, eigenvalue)]
-
-
-def normal_form(pair: Plane) -> NormalForm:
-    """The normal form of two modes."""
-    dual = np.linalg.solve(pair.left.T @ pair.right, pair.left.T).T
-    return NormalForm.of_block(dual.T @ (pair.system.stiffness @ pair.right), pair.discriminant, pair.right, dual)
+    found = []
+    for pair in _follow_pair(packings, eigenvalue):
+        dual = np.linalg.solve(pair.left.T @ pair.right, pair.left.T).T
+        block = dual.T @ (pair.system.stiffness @ pair.right)
+        found.append(NormalForm.of_block(block, pair.discriminant, pair.right, dual))
+    return found
 
 
 def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexes:
@@ -159,17 +144,15 @@ def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Pla
     pair: Plane | None = None
     for packing in packings:
         system = System.of(packing)
-        pair = pair_about(_modes_near(system, eigenvalue), eigenvalue) if pair is None else pair.at(system)
+        pair = pair.at(system) if pair else pair_about(_modes_near(system, eigenvalue), eigenvalue)
         yield pair
 
 
 def _modes_near(system: System, value: float) -> Motions:
     """The modes next to an eigenvalue, or all."""
-    if len(system.active) > DENSE:
-        try:
+    with suppress(LinAlgError):
+        if len(system.active) > DENSE:
             return Motions.near(system, [(value, 12)])
-        except LinAlgError:
-            pass
     return Motions.of(system)
 
 

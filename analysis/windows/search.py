@@ -24,6 +24,7 @@ about each such change.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any
 
@@ -31,7 +32,7 @@ import numpy as np
 
 from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
-from .edges import DoubtError, Track, TrackPoint, growth_of, nearest_pair, sign_change
+from .edges import DoubtError, Track, growth_of, nearest_pair, sign_change, track_point
 from .motions import Motions, System
 from .onset import Edge, Window
 
@@ -83,13 +84,9 @@ class Search:
     """
 
     def __init__(
-        self,
-        system: SystemOfLoad,
-        narrowest: float,
-        few: Few | None = None,
-        first: bool = False,
+        self, system: SystemOfLoad, narrowest: float, few: Few | None = None, first: bool = False,
         decompose: Callable[[System], Motions] = Motions.of,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.at, self.narrowest, self.few, self.first = system, narrowest, few, first
         self._decompose = decompose
         self.growing: list[tuple[complex, Edge]] | None = None  # eigenvalues at the load reached so far
@@ -108,12 +105,10 @@ class Search:
             for load in [*sorted(look(below, above)), above]:
                 try:
                     there = self.at(load)
-                except TurningPointError:
-                    if not (self.growing or self.closed):
-                        raise
-                    return
-                except NoEquilibriumError:
-                    if load == above:
+                except NoEquilibriumError as error:
+                    if isinstance(error, TurningPointError) and (self.growing or self.closed):
+                        return
+                    if load == above or isinstance(error, TurningPointError):
                         raise
                     continue
                 # where contacts change on the way, a short step about each change
@@ -145,10 +140,8 @@ class Search:
     def _between(self, below: float, middle: float, above: float) -> System | None:
         """The system at the middle load, or at a load beside it; None if none of these has an equilibrium."""
         for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
-            try:
+            with suppress(NoEquilibriumError):
                 return self.at(fx) if below < fx < above else None
-            except NoEquilibriumError:
-                continue
         return None
 
     def _motions(self, *systems: System) -> list[Motions]:
@@ -172,10 +165,9 @@ class Search:
             same, begins, ends = self._changes(below, above)
         except DoubtError as doubt:
             if span > self.narrowest:
-                fx = doubt.fx if doubt.fx is not None else here.fx + 0.47 * span
+                fx = doubt.args[0] if doubt.args else here.fx + 0.47 * span
                 fx = float(np.clip(fx, here.fx + 0.02 * span, there.fx - 0.02 * span))
-                inside = self._between(here.fx, fx, there.fx)
-                if inside is not None:
+                if (inside := self._between(here.fx, fx, there.fx)) is not None:
                     self._advance(here, inside)
                     if not self._finished:
                         self._advance(inside, there)
@@ -214,53 +206,45 @@ class Search:
         edges: list[dict[int, Edge]] = [{}, {}]
         for inside, k in [(1, k) for k in begun] + [(0, k) for k in ended]:
             # the two real levels that are the pair at the other load
-            out, pair = 1 - inside, TrackPoint.of(states[inside], drifts[inside], k)
-            expected = pair.numbers + (states[out].system.fx - pair.fx) * pair.slopes
+            out, (fx, numbers, slopes) = 1 - inside, track_point(states[inside], drifts[inside], k)
+            expected = numbers + (states[out].system.fx - fx) * slopes
             _, two = nearest_pair(states[out].values[levels[out]], expected)
             members = [k], [int(level) for level in levels[out][two]]
             edges[inside][k] = self._edge(self._track(states, drifts, *(members[::-1] if inside else members)))
             levels[out] = np.delete(levels[out], two)
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike = below.alike(above, *levels)
-            pairs = [(levels[0][i], levels[1][j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels = [np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1)]
+            pairs = sorted((levels[0][i], levels[1][j]) for i, j in assign(alike) if alike[i, j] > ALIKE)
+            levels = [np.array(sorted(pair[end] for pair in pairs), dtype=np.int64) for end in (0, 1)]
         if len(levels[0]) != len(levels[1]):
             raise DoubtError
 
         # two real levels may meet between two loads at which they are neighbours
         before = self._before
         arrival = drifts[0] if before is None or before.fx >= below.system.fx else below.slopes(before)
-        (g0, g1), (v0, v1, v2) = (
-            [np.diff(state.values[own].real) for state, own in zip(states, levels, strict=True)],
-            [
-                span * np.diff(drift[own].real)
-                for drift, own in zip((*drifts, arrival), (*levels, levels[0]), strict=True)
-            ],
-        )
+        g0, g1 = (np.diff(state.values[own].real) for state, own in zip(states, levels, strict=True))
+        ways = zip((*drifts, arrival), (*levels, levels[0]), strict=True)
+        v0, v1, v2 = (span * np.diff(drift[own].real) for drift, own in ways)
         width, place = lowest(g0**2, 2 * g0 * v0, g1**2, 2 * g1 * v1)
         near = width * span > self.narrowest
         bent = lowest(g0**2, 2 * g0 * v2, g1**2, 2 * g1 * v1)[0] * span > self.narrowest
         bent |= np.abs(v2 - v0) > g0  # their speed is another one, so that the equilibrium may have jumped
         if np.any(bent & ~near):
             raise DoubtError  # they would meet if they went on as on the way to the lower load
-        looks = []
         for k in np.flatnonzero(near).tolist():
-            looks.append((self._track(states, drifts, levels[0][k : k + 2], levels[1][k : k + 2]), place[k]))
+            self._look_inside(self._track(states, drifts, levels[0][k : k + 2], levels[1][k : k + 2]), place[k])
         for i, j in same:  # a complex pair may be real in between
             track = self._track(states, drifts, [i], [j])
-            width, place = lowest(
-                *(np.array([n]) for p in track.points for n in (growth_of(p.numbers), span * growth_of(p.slopes)))
-            )
+            four = (growth for _, v, s in track.points for growth in (growth_of(v), span * growth_of(s)))
+            width, place = lowest(*(np.array([each]) for each in four))
             if width[0] * span > self.narrowest:
-                looks.append((track, place[0]))
-        for track, where in looks:
-            self._look_inside(track, float(where))
+                self._look_inside(track, place[0])
         return same, edges[1], edges[0]
 
     def _track(self, states: Sequence[Motions], drifts: Sequence[Complexes], *members: Any) -> Track:
         """The motion that has these members at the lower load and those at the upper one."""
-        below, above = (TrackPoint.of(*each[:2], *each[2]) for each in zip(states, drifts, members, strict=True))
-        return Track(self.at, below, above)
+        below, above = (track_point(*each[:2], *each[2]) for each in zip(states, drifts, members, strict=True))
+        return Track(self.at, (below, above))
 
     def _look_inside(self, track: Track, place: float) -> None:
         """Look where the growth of a pair may have the other sign than at both ends: a DoubtError if it has.
@@ -292,23 +276,24 @@ class Search:
     def _edge(self, track: Track) -> Edge:
         """The edge of a motion that grows at one of two loads; in doubt unless its growth begins or ends once."""
         change, (below, above) = sign_change(track.growth, *track.ends), track.ends
-        left, right = change.loads[0], change.loads[-1]
-        if not change.smooth:
+        fx, _, loads, smooth = change
+        left, right = loads[0], loads[-1]
+        if not smooth:
             one, other = track.at(left), track.at(right)
             jump = float(np.abs(one.stiffness - other.stiffness).max())
-            largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, track.ends))
+            largest, usual = (max(abs(track.growth(each)) for each in places) for places in (loads, track.ends))
             wide = not track.pairs and above - below > 100 * self.narrowest  # s is not smooth where two coalesce
             if jump < 1e-7 * one.frequency**2 and (wide or largest > 1e-3 * usual):
-                raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one
+                raise DoubtError(fx)  # the equilibrium does not jump: the motion has become another one
         elif track.pairs and below < left < right < above:
             # on either side of the edge the growth may change its sign again
             slope = (track.growth(right) - track.growth(left)) / (right - left)
-            for end, near in zip(track.points, (left, right), strict=True):
-                sign, step, drift = np.sign(growth_of(end.numbers)), near - end.fx, growth_of(end.slopes)
-                numbers = growth_of(end.numbers), drift * step, track.growth(near), slope * step
-                if abs(step) * lowest(*(np.array([sign * each]) for each in numbers))[0][0] > self.narrowest:
+            for (end, numbers, slopes), near in zip(track.points, (left, right), strict=True):
+                sign, step, drift = np.sign(growth_of(numbers)), near - end, growth_of(slopes)
+                four = growth_of(numbers), drift * step, track.growth(near), slope * step
+                if abs(step) * lowest(*(np.array([sign * each]) for each in four))[0][0] > self.narrowest:
                     raise DoubtError
-        return track.edge(change)
+        return track.edge(*change)
 
     def _changes_of_motions(self, states: tuple[Motions, Motions], drifts: Sequence[Complexes]) -> Changes:
         """As `_changes`, with dissipation."""
@@ -319,7 +304,7 @@ class Search:
         image = dict(assign(alike))
         origin = {j: i for i, j in image.items()}
         rows, columns = (np.flatnonzero(each.grows).tolist() for each in states)
-        if any(i not in image for i in rows) or any(j not in origin for j in columns):
+        if not (image.keys() >= set(rows) and origin.keys() >= set(columns)):
             raise DoubtError
         for i in {*rows, *(origin[j] for j in columns)}:
             if alike[i, image[i]] < max(ALIKE, 0.8 * alike[i].max(), 0.8 * alike[:, image[i]].max()):

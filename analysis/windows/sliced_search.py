@@ -13,14 +13,13 @@ contacts open, close or slide. What is announced is then not there, or elsewhere
 finest parts that are still in doubt are named with the result. Strong dashpots couple more motions than a slice can
 hold: all loads before the window are then named.
 
-The eigenvectors of slices take most of the time, and one slice needs nothing of another: ranks and searches that name
-the same folder share them (:mod:`~faultgouge.analysis.windows.slices`).
+The eigenvectors of slices take most of the time, and one slice needs nothing of another: ranks share them
+(:mod:`~faultgouge.analysis.windows.slices`).
 """
 
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -37,8 +36,18 @@ from .motions import Motions, System
 from .onset import Increments, Window
 from .quiet import Quiet
 from .search import Search
-from .slices import ALONE, LIMITS, Limits, Ranks, slices
-from .store import NEW_PASS, Candidate, SlicePass, SliceResult, pass_folder
+from .slices import (
+    ALONE,
+    LIMITS,
+    Candidate,
+    Limits,
+    Ranks,
+    SliceResult,
+    keep_result,
+    kept_results,
+    results_folder,
+    slices,
+)
 
 
 class LostPairError(FaultgougeError):
@@ -52,19 +61,14 @@ class SlicedSearch:
     ----------
     at : callable
         Load -> System.
-    modes, ranks, folder, limits
+    ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
     def __init__(
-        self,
-        at: Callable[[float], System],
-        modes: tuple[int, int] | None = None,
-        ranks: Ranks = ALONE,
-        folder: Path | None = None,
-        limits: Limits = LIMITS,
+        self, at: Callable[[float], System], ranks: Ranks = ALONE, folder: Path | None = None, limits: Limits = LIMITS
     ) -> None:
-        self.at, self.modes, self.ranks, self.folder, self.limits = at, modes, ranks, folder, limits
+        self.at, self.ranks, self.folder, self.limits = at, ranks, folder, limits
         self.doubtful: list[tuple[float, float]] = []
         self.passed: list[System] = []
         self.crowded = False
@@ -73,7 +77,7 @@ class SlicedSearch:
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         """The first window along a ramp, if there is one, and the increments before it that are in doubt.
 
-        Loads beyond the one above the onset are not asked for, except those of `Limits.increments_ahead` increments.
+        Loads beyond the one above the onset are not asked for.
         The window's end is None where its motion grows at the next load.
 
         Raises
@@ -83,21 +87,13 @@ class SlicedSearch:
         SliceError
             If a part of the spectrum is not found.
         """
-        here, done = self.at(float(loads[0])), 1
-        first: Window | None = None
-        while done < len(loads) and first is None:
-            ahead = 1 if self._keeps(here) else self.limits.increments_ahead
-            places = [here]
-            for load in loads[done : done + ahead]:
-                try:
-                    places.append(self.at(float(load)))
-                except NoEquilibriumError:
-                    if len(places) == 1:
-                        raise
-                    break
-            first = self._walk(places, 0)
-            here = places[-1]
-            done += len(places) - 1
+        here, first = self.at(float(loads[0])), None
+        for load in loads[1:]:
+            there = self.at(float(load))
+            first = self._walk([here, there], 0)
+            here = there
+            if first is not None:
+                break
         last = here.fx if first is None else first.fx_onset
         if self.crowded and last > loads[0]:
             self.doubtful = [(float(loads[0]), max(each.fx for each in self.passed))]
@@ -114,10 +110,8 @@ class SlicedSearch:
             parts: list[System] = []
             if doubt and depth < self.limits.depth:
                 inside = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
-                try:
+                with suppress(NoEquilibriumError):  # one of the parts has no equilibrium at its end
                     parts = [self.at(float(load)) for load in inside]
-                except NoEquilibriumError:  # one of the parts has no equilibrium at its end
-                    parts = []
             if parts:
                 window = self._walk([here, *parts, there], depth + 1) or window
             elif doubt:
@@ -125,8 +119,6 @@ class SlicedSearch:
             if window is not None:
                 return window
         return None
-
-    # What the system itself has
 
     def _earliest(
         self, candidates: list[Candidate], here: System, there: System, finest: bool
@@ -171,12 +163,15 @@ class SlicedSearch:
         """The windows of the few motions next to an announced one."""
         known = {each.fx: each for each in (here, there)}
 
-        def motions(system: System) -> Motions:
-            value = candidate.value + candidate.slope * (system.fx - candidate.inside)
+        def few(*systems: System) -> tuple[Motions, Motions]:
+            values = [candidate.value + candidate.slope * (each.fx - candidate.inside) for each in systems]
+            if here.damping is None:
+                values = [each.real for each in values]
             try:
-                return Motions.near(system, [(value.real if system.damping is None else value, 10)])
+                below, above = (Motions.near(*each) for each in zip(systems, [[(v, 10)] for v in values], strict=True))
             except LinAlgError:
                 raise DoubtError from None
+            return below, above
 
         def lost(system: System) -> NoReturn:
             pair = f"the pair of eigenvalues about {candidate.value.real:.6g}"
@@ -187,60 +182,44 @@ class SlicedSearch:
             )
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
-
-        def few(below: System, above: System) -> tuple[Motions, Motions]:
-            return motions(below), motions(above)
-
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
         inside = [candidate.inside] if here.fx < candidate.inside < there.fx else []
         *_, (_, found) = search.along(np.array([here.fx, *inside, there.fx]))
         return found
 
-    # What slices announce
-
     def _announced(self, places: Sequence[System]) -> list[Candidate]:
-        """The motions that slices announce, of all ranks and searches."""
-        first, stop = self._range(places[0])
-        while True:
-            stored = self.ranks.together(lambda: self._stored(places) if self.ranks.rank == 0 else NEW_PASS)[0]
-            fresh = self.ranks.together(partial(self._search_slices, places, stored))
-            every = (*stored.found, *(each for one in fresh for each in one))
-            found = sorted(every, key=lambda each: each.border.modes)
-            if stored.folder is None or sum(each.border.size for each in found) == stop - first:
-                break
-            if not any(fresh):
-                time.sleep(self.limits.wait_seconds)
-        self.crowded = self.crowded or any(each.crowded for each in found)
-        return [candidate for each in found for candidate in each.candidates]
-
-    def _stored(self, places: Sequence[System]) -> SlicePass:
-        """Results that other searches have left; none if bases are kept, since later increments need them."""
-        if self.folder is None or self._keeps(places[0]):
-            return NEW_PASS
-        return SlicePass.read(pass_folder(self.folder, places, self._range(places[0]), self.limits))
-
-    def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
-        """Results of this rank's slices, without the slices that are stored."""
-        found: list[SliceResult] = []
-        first, stop = self._range(places[0])
-        before = sum(each.size for each in stored.borders)
-        done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
+        """The motions that slices announce, of all ranks, and those that a search that was cut off has left."""
+        count, folder = len(places[0].active), None
+        if self.folder is not None and not self._keeps(places[0]):  # later increments need bases that are kept
+            folder = results_folder(self.folder, places, self.limits)
+        root = self.ranks.rank == 0
+        stored = self.ranks.together(lambda: kept_results(folder) if folder is not None and root else [])[0]
+        before = sum(each.border.size for each in stored)
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        known = f"{before} of {stop - first} modes are known" if stored.shifts else "modes are counted"
-        report_progress(f"{where}: {known}")
-        failure: FaultgougeError | None = None
-        for basis in self._bases(places[0], stored):
-            done += basis.own.stop - basis.own.start
-            report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
-            try:
-                found.append(self._search_slice(basis, places))
-            except FaultgougeError as error:
-                failure = failure or error  # it waits: the ranks meet at the end of their bases
-                continue
-            stored.keep(found[-1])
-        if failure is not None:
-            raise failure
-        return found
+        report_progress(f"{where}: {before} of {count} modes are known")
+
+        def search_slices() -> list[SliceResult]:
+            """Those of this rank."""
+            found: list[SliceResult] = []
+            done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
+            failure: FaultgougeError | None = None
+            for basis in self._bases(places[0], stored):
+                done += basis.own.stop - basis.own.start
+                report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
+                try:
+                    found.append(self._search_slice(basis, places))
+                except FaultgougeError as error:
+                    failure = failure or error  # it waits: the ranks meet at the end of their bases
+                    continue
+                if folder is not None:
+                    keep_result(folder, found[-1])
+            if failure is not None:
+                raise failure
+            return found
+
+        every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
+        self.crowded = self.crowded or any(each.crowded for each in every)
+        return [candidate for each in every for candidate in each.candidates]
 
     def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
         """The windows of the small families between the loads, of one slice's own motions."""
@@ -274,43 +253,32 @@ class SlicedSearch:
                     found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
         return SliceResult(basis.border, found, quiet.crowded)
 
-    # Bases
-
-    def _range(self, place: System) -> tuple[int, int]:
-        """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
-        count = len(place.active)
-        first, stop = self.modes or (0, count)
-        if not 0 <= first < min(stop, count):
-            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
-        return first, min(stop, count)
-
     def _keeps(self, place: System) -> bool:
-        """Whether there is memory for the bases of all modes that are looked at."""
-        first, stop = self._range(place)
-        margins = 2 * self.limits.margin * max(1, round((stop - first) / self.limits.slice_size))
-        return (stop - first + margins) * len(place.active) <= self.limits.largest_basis
+        """Whether there is memory for the bases of all modes."""
+        count = len(place.active)
+        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
+        return (count + margins) * count <= self.limits.largest_basis
 
-    def _bases(self, place: System, stored: SlicePass) -> Iterable[Slice]:
+    def _bases(self, place: System, stored: Sequence[SliceResult]) -> Iterator[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
         mine = [_mixing(each, place) for each in self._kept]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
-            return self._kept
-        self._kept = []  # its memory is free before that for the next ones is taken
-        bases: Iterable[Slice] = self._new_bases(place, stored)
-        if self._keeps(place):
-            bases = self._kept = list(bases)
-        return bases
-
-    def _new_bases(self, place: System, stored: SlicePass) -> Iterator[Slice]:
-        """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
+            yield from self._kept
+            return
+        self._kept, keeps = [], self._keeps(place)  # its memory is free before that for the next ones is taken
         matrix = csr_array(place.inner[0])
-        symmetric, wanted = csc_array(0.5 * (matrix + matrix.T)), self._range(place)
-        if len(place.active) > self.limits.one_basis:
-            yield from slices(symmetric, self.limits.margin, wanted, self.limits, ranks=self.ranks, stored=stored)
-        elif self.ranks.rank == 0 and not stored.found:
+        symmetric, count = csc_array(0.5 * (matrix + matrix.T)), len(place.active)
+        bases: Iterator[Slice] = iter(())
+        if count > self.limits.one_basis:
+            borders = [each.border for each in stored]
+            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks, known=borders)
+        elif self.ranks.rank == 0 and not stored:  # a small operator has one
             values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
-            yield Slice(0, values, vectors, slice(*wanted))
+            bases = iter([Slice(0, values, vectors, slice(0, count))])
+        if keeps:
+            self._kept = list(bases)
+        yield from self._kept if keeps else bases
 
 
 def reduce_system(vectors: Floats, system: System, active: Indices) -> list[Floats]:

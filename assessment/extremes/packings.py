@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,15 +90,6 @@ def with_low_parts(packing: Packing) -> Packing:
         return packing
     contacts = packing.contacts.slipped(packing.contacts.slip, np.zeros(len(packing.contacts)))
     return replace(packing, position_low=np.zeros_like(packing.position), contacts=contacts)
-
-
-def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
-    """The packing, whose masses are one and angles zero, with small disks more that touch nothing, at positions of
-    shape (n, 2), in the upper layer or not."""
-    radius, tops = np.full(len(position), 0.5), np.full(len(position), top)
-    larger: dict[str, Any] = {"position": np.vstack([packing.position, position]), "angle": None, "mass": None}
-    larger |= {"radius": np.append(packing.radius, radius), "top": np.append(packing.top, tops)}
-    return replace(packing, **larger)
 
 
 def at_rest(packing: Packing) -> Equilibrium:

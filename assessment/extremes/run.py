@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -19,23 +18,16 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import make_folder, write_json, write_text
-from ...figures.pages import render
+from ...analysis.files.atomic_write import make_folder
 from ...figures.style import INK, report_failure, save, styled
+from ..results import AssessmentError, reason_of, write_results
 from .cases import Case, cases
-
-PICTURE_WIDTH, ROW = 5.4, 0.135
-"""Width of the picture and height of a row, inch: names of seven points can be read at the width of a page."""
 
 LOWEST = 1e-6
 """Left end of the picture, in units of the bound; what is smaller, such as an exact zero, is drawn there."""
 
 Outcome = dict[str, Any]
 """name, group, status ("holds", "refused" or "fails"), figure, bound, says: the criterion, or the sentence."""
-
-
-class ExtremeCasesError(FaultgougeError):
-    """Cases that failed, in one sentence."""
 
 
 def extremes(
@@ -61,22 +53,17 @@ def extremes(
     dict
         What extremes.json holds: each case's name, group, status, figure, bound and what it says.
     """
-    root = MPI.COMM_WORLD.rank == 0
+    root, done = MPI.COMM_WORLD.rank == 0, list[Outcome]()
     if root:
         make_folder(output, "extremes.json", "extremes.md")
-    done: list[Outcome] = []
     for case in progress([case for case in wanted or cases() if case.quick or not quick]):
         done.append(try_case(case))
         if done[-1]["status"] == "fails":
             say(f"{case.group}, {case.name}: {done[-1]['says']}")
         if root:
-            write_json(output / "extremes.json", {"cases": done}, allow_nan=False)
-            statuses = [each["status"] for each in done]
-            groups = [(name, list(members)) for name, members in groupby(done, lambda each: each["group"])]
             drawn = output / "ramps.txt"  # of `python -m fuzz.ramps`, beside its picture
             ramps = drawn.read_text() if drawn.exists() else ""
-            page = render(__package__ or "", "extremes.md.j2", statuses=statuses, groups=groups, ramps=ramps)
-            write_text(output / "extremes.md", page)
+            write_results(output, "extremes", __package__ or "", {"cases": done}, ramps=ramps)
     if root:
         with report_failure(f"{output}/extremes.png", say):
             save(extremes_figure(done), output / "extremes")
@@ -87,7 +74,7 @@ def try_case(case: Case) -> Outcome:
     """The outcome of a case. Any error is a failure of this case alone, unless the ranks have lost each other."""
     about: Outcome = {"name": case.name, "group": case.group, "status": "fails", "figure": None, "bound": None}
     try:
-        found = case.run()
+        figure, bound, says = case.run()
     except Exception as error:
         if getattr(error, "one_rank", False):
             raise
@@ -95,56 +82,47 @@ def try_case(case: Case) -> Outcome:
         sentence = isinstance(error, ValueError | FaultgougeError) and "\n" not in said and "Traceback" not in said
         if sentence and case.refusal and case.refusal in said:
             return about | {"status": "refused", "says": said}
-        return about | {"says": f"{type(error).__name__}: {(said.splitlines() or ['no reason given'])[0]}"}
+        return about | {"says": reason_of(error)}
     if case.refusal:
         return about | {"says": f"it was not refused, expected: {case.refusal}"}
-    figure, bound, says = float(found[0]), float(found[1]), found[2]
     if not isfinite(figure):
-        return about | {"bound": bound, "says": f"not a number; {says}"}
-    return about | {"status": "holds" if figure <= bound else "fails", "figure": figure, "bound": bound, "says": says}
+        return about | {"bound": float(bound), "says": f"not a number; {says}"}
+    status = "holds" if figure <= bound else "fails"
+    return about | {"status": status, "figure": float(figure), "bound": float(bound), "says": says}
 
 
 def check(result: dict[str, Any]) -> None:
-    """Raise ExtremeCasesError if a case of a result has failed."""
+    """Raise AssessmentError if a case of a result has failed."""
     failed = [case["name"] for case in result["cases"] if case["status"] == "fails"]
     if failed:
-        raise ExtremeCasesError(f"{len(failed)} of {len(result['cases'])} cases failed: {'; '.join(failed)}")
+        raise AssessmentError(f"{len(failed)} of {len(result['cases'])} cases failed: {'; '.join(failed)}")
 
 
 @styled
 def extremes_figure(done: Sequence[Outcome]) -> Figure:
     """A row for each case: a mark at its figure over its bound, and beyond the bound's line for a refusal."""
-    rows: dict[float, Outcome] = {}
-    heads: dict[float, str] = {}
-    place = -1.5
-    for group, members in groupby(done, lambda each: each["group"]):
-        heads[place := place + 1.5] = group
-        for each in members:
-            rows[place := place + 1] = each
-    figure = Figure(figsize=(PICTURE_WIDTH, ROW * (place + 1.5) + 0.9), layout="constrained")
+    figure = Figure(figsize=(5.4, 0.135 * len(done) + 1.2), layout="constrained")
     axes = figure.add_subplot()
-    for at, group in heads.items():
-        axes.text(0.42 * LOWEST, at, group, fontsize=8, style="italic", va="center")
     statuses = ("holds", "hold", "oC1"), ("refused", "refused, as they should be", "sC2"), ("fails", "fail", "XC0")
     for status, words, style in statuses:
-        drawn = {at: each for at, each in rows.items() if each["status"] == status}
-        ratio = [8 if each["figure"] is None else _share(each["figure"], each["bound"]) for each in drawn.values()]
-        axes.plot(ratio, list(drawn), style[0], color=style[1:], label=f"{len(drawn)} {words}")
+        rows = [row for row, each in enumerate(done) if each["status"] == status]
+        ratios = [8.0 if done[row]["figure"] is None else _ratio(done[row]) for row in rows]
+        axes.plot(ratios, rows, style[0], color=style[1:], label=f"{len(rows)} {words}")
         if status != "refused":
-            axes.hlines(list(drawn), LOWEST, ratio, color=style[1:], linewidth=0.6, alpha=0.5)
-    names = (re.sub(r"([kFf])_([a-z]+)(\^c)?", r"$\1_{\2}\3$", each["name"]) for each in rows.values())
+            axes.hlines(rows, LOWEST, ratios, color=style[1:], linewidth=0.6, alpha=0.5)
+    names = (re.sub(r"([kFf])_([a-z]+)(\^c)?", r"$\1_{\2}\3$", each["name"]) for each in done)
     labels = [name.replace("mu =", r"$\mu$ =").replace("eps =", r"$\epsilon$ =") for name in names]
     axes.axvline(1, color=INK, linewidth=0.8)
-    axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(place + 1, -1), xlabel="figure / bound")
-    axes.set_yticks(list(rows), labels, fontsize=7)
+    axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(len(done), -1), xlabel="figure / bound")
+    axes.set_yticks(range(len(done)), labels, fontsize=7)
     axes.set_xticks([LOWEST, 1e-4, 1e-2, 1], ["0", "$10^{-4}$", "$10^{-2}$", "1"])
     axes.tick_params(axis="x", labeltop=True)  # the picture is longer than a screen
-    axes.tick_params(axis="y", length=0, which="both")
     axes.minorticks_off()
     figure.legend(loc="outside upper center", ncols=3)
     return figure
 
 
-def _share(figure: float, bound: float) -> float:
+def _ratio(case: Outcome) -> float:
     """The figure in units of its bound, within the picture."""
-    return float(np.clip(figure / bound if bound > 0 else figure * np.inf if figure else 0.0, LOWEST, 8))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.clip(np.nan_to_num(np.divide(case["figure"], case["bound"])), LOWEST, 8))

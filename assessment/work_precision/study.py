@@ -120,8 +120,7 @@ def study_of(
     theory : sequence of (str, array_like, array_like)
         Lines of the figure.
     **more
-        orders : those that theory predicts, of `fit_order`; covered : stated and true errors of an onset, with
-        arithmetic and increment.
+        orders : those that theory predicts, of `fit_order`.
     """
     best = {point.method: point for point in sorted(points, key=lambda each: -each.error)}
     known = {"points": points, "best": best, **numbers, **more}
@@ -134,8 +133,7 @@ def study_of(
         for label, error, parameter in theory
     ]
     rows = [point._asdict() for point in points]
-    empty: Study = {"remarks": [], "orders": [], "covered": []}
-    return empty | said | {"reference_error": reference_error, "points": rows, "theory": lines} | more
+    return said | {"orders": []} | {"reference_error": reference_error, "points": rows, "theory": lines} | more
 
 
 def compensate(equilibrium: Equilibrium) -> Equilibrium:

@@ -26,6 +26,9 @@ along the mode and left to undamped dynamics. The velocity, projected on the mod
 with complex :math:`\Omega`: least squares give :math:`\cos\Omega h`. The frequency that velocity Verlet gives is known
 exactly, :math:`\sin\tfrac12\Omega\,\Delta t = \tfrac12\omega\,\Delta t`: the error is :math:`\omega^3 \Delta t^2/24`,
 and it can be subtracted from the measured frequency.
+
+The reference is the eigenvalue of the frozen K. The rounding of K's entries moves it by :math:`u |A|_F \kappa`, with
+the condition :math:`\kappa = 1/|y^H x|`.
 """
 
 from __future__ import annotations
@@ -35,23 +38,24 @@ from functools import partial
 import numpy as np
 from scipy.linalg import eig
 
-from ...analysis import MindlinLaw, Packing, discrete_frequency, dynamical_matrix, spectrum, stable_timestep, touching
+from ...analysis import MindlinLaw, Packing, discrete_frequency, dynamical_matrix, stable_timestep, touching
 from ...analysis.arrays import Floats
 from ...analysis.motion.eigenvalues import unit_rounding
 from ...pywrap import Engine
-from .eigenvalues import refine_eigenvalue
-from .study import COMPENSATED_SUFFIX, Run, Settings, Study, compensate, fit_order, study_of, timed
+from .study import Run, Settings, Study, compensate, fit_order, study_of, timed
 
 TIME, COARSEST = 2.0, 200
 """Length of the run of three disks, two swings of the overlaps, and its fewest steps: 60 to a period of the fastest
 mode."""
 
-LAMMPS, MIDPOINT, END = "LAMMPS, tangent at the middle", "NumPy, tangent at the middle", "NumPy, tangent at the end"
-
 STEP_SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 """Time steps in units of the limit 2/omega_max."""
 
 RUN, RUN_CORRECTED = "run", "run, dispersion taken out"
+
+AMPLITUDE = 1e-12
+"""Largest coordinate of the displacement that a run starts with, length: far above what a coordinate is known to,
+1e-23, and far below the overlaps, 1e-5 and more, so that the packing is nearly linear."""
 
 
 def three_disks() -> Packing:
@@ -64,7 +68,7 @@ def three_disks() -> Packing:
     return Packing(position=position, radius=radius, contacts=contacts, law=law, top=top, fx=0.3, fy=3.0)
 
 
-def verlet(packing: Packing, midpoint: bool, steps: int) -> tuple[Floats, int]:
+def verlet(packing: Packing, steps: int) -> tuple[Floats, int]:
     """(x, y, u) of the disks after `TIME` from rest, shape (3, N), length; no contact may form or open."""
     i, j, pair, dt = packing.contacts.i, packing.contacts.j, ~packing.contacts.floor, TIME / steps
     mass = packing.mass * np.array([[1.0], [1.0], [packing.inertia_factor]])
@@ -76,8 +80,7 @@ def verlet(packing: Packing, midpoint: bool, steps: int) -> tuple[Floats, int]:
         position, angle = packing.position + step[:2].T, packing.angle + step[2] / packing.radius
         there = packing.moved(position, angle, packing.contacts)
         middle = packing.moved(position - 0.5 * step[:2].T, angle, packing.contacts)
-        along = (middle if midpoint else there).geometry.tangent
-        slip = packing.contacts.slip + np.sum(along.T * moved, axis=0) - turned
+        slip = packing.contacts.slip + np.sum(middle.geometry.tangent.T * moved, axis=0) - turned
         clamped = packing.law.clamped(there.geometry.overlap, slip)
         packing = packing.moved(position, angle, packing.contacts.slipped(clamped))
         velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
@@ -85,8 +88,8 @@ def verlet(packing: Packing, midpoint: bool, steps: int) -> tuple[Floats, int]:
 
 
 def trajectory(settings: Settings) -> Study:
-    """Where three disks are after a time: LAMMPS and NumPy with the tangent at the middle of the step, NumPy with the
-    tangent at its end. The reference is Richardson's extrapolation of LAMMPS's runs with the most steps."""
+    """Where three disks are after a time, by LAMMPS and NumPy. The reference is Richardson's extrapolation of LAMMPS's
+    runs with the most steps."""
     packing = three_disks()
     fine, coarse, finest = (8, 5, 204_800) if settings.quick else (10, 7, 819_200)
     steps = [COARSEST * 2**k for k in range(fine)]
@@ -101,105 +104,65 @@ def trajectory(settings: Settings) -> Study:
 
         ends = [in_lammps(finest // part)[0] for part in (4, 2, 1)]
         rough, exact = ((4 * ends[k + 1] - ends[k]) / 3 for k in (0, 1))
-        runs: list[Run[Floats]] = [(LAMMPS, TIME / n, partial(in_lammps, n)) for n in steps]
-        for method in (MIDPOINT, END):
-            runs += [(method, TIME / n, partial(verlet, packing, method == MIDPOINT, n)) for n in steps[:coarse]]
+        runs: list[Run[Floats]] = [("LAMMPS", TIME / n, partial(in_lammps, n)) for n in steps]
+        runs += [("NumPy", TIME / n, partial(verlet, packing, n)) for n in steps[:coarse]]
         points, found = timed(runs, settings, lambda end: float(np.abs(end - exact).max()))
     reference_error = float(np.abs(exact - rough).max())
-    apart = float(np.abs(np.subtract(found[:coarse], found[fine : fine + coarse])).max())
-    needed = next(point for point in points[fine:] if point.error < points[-1].error)
-    ends_of_line = TIME / np.array([steps[0], steps[-1]])
-    theory = [
-        (f"order {p}", e * (steps[0] / TIME * ends_of_line) ** p, ends_of_line) for p, e in ((1, 4e-4), (2, 2e-4))
-    ]
-    expected = ((LAMMPS, 2), (MIDPOINT, 2), (END, 1))
-    orders = [fit_order(points, name, order, least=100 * reference_error) for name, order in expected]
-    return study_of("trajectory", points, reference_error, {"apart": apart, "needed": needed}, theory, orders=orders)
-
-
-class FastestMode:
-    """The mode of a packing that grows fastest, in mass-weighted coordinates.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium, whose arithmetic is that of the run.
-    amplitude : float
-        Largest coordinate of the displacement that a run starts with, length: far above what a coordinate is known to,
-        1e-23 or 2e-15, and far below the overlaps, 1e-5 and more, so that the packing is nearly linear.
-    right, left : ndarray of complex, shape (3N,)
-        Unit vectors; zero on coordinates that feel no force.
-    omega : complex
-        The frequency, from the eigenvalue refined in extended precision, radian / time.
-    rate, resolution : float
-        Growth rate of D, 1 / time, and its relative error by the rounding of the operator's entries.
-    limit : float
-        2 / omega_max, time.
-    """
-
-    def __init__(self, packing: Packing, amplitude: float) -> None:
-        self.packing, self.amplitude = packing, amplitude
-        sparse, active = dynamical_matrix(packing)
-        matrix = sparse.toarray()
-        values, left, right = eig(matrix, left=True, right=True)
-        k = int(np.argmin(np.sqrt(values).imag))
-        self.right, self.left = np.zeros((2, 3 * len(packing)), dtype=np.complex128)
-        self.right[active], self.left[active] = right[:, k], left[:, k]
-        condition = 1 / abs(np.vdot(left[:, k], right[:, k]))
-        refined, error = refine_eigenvalue(matrix, complex(values[k]), right[:, k], condition)
-        self.omega = complex(np.sqrt(complex(refined)))
-        self.rate = 2 * abs(self.omega.imag)
-        self.resolution = float((unit_rounding(matrix) * condition + error) / abs(self.omega) / self.rate)
-        self.limit = stable_timestep(float(np.sqrt(np.abs(values).max())))
-
-    def off(self, omega: complex) -> float:
-        """Relative error of a growth rate, no less than the rounding of a number."""
-        return max(abs(2 * abs(omega.imag) / self.rate - 1), float(np.finfo(float).eps))
-
-    def run(self, engine: Engine, dt: float, time: float) -> tuple[tuple[float, ...], int]:
-        """Errors of the rate that a run in LAMMPS shows, as it is, and with the dispersion taken out; and its steps."""
-        every = max(1, round(0.25 * np.pi / self.omega.real / dt))  # an eighth of a period
-        mass, inertia = self.packing.mass, self.packing.inertia_factor
-        root = np.sqrt(np.concatenate([mass, mass, inertia * mass]))
-        displacement = self.right.real / root
-        engine.restore(engine.displace(self.packing, self.amplitude * displacement / np.abs(displacement).max()))
-        signal = []
-        with engine.undamped(dt) as dynamics:
-            for _ in range(max(4, int(time / dt / every))):
-                motion = dynamics.advance(every)
-                velocity = np.concatenate([*motion.velocity.T, self.packing.radius * motion.spin])
-                signal.append(np.vdot(self.left, root * velocity))
-        b = np.array(signal)
-        cosine = np.vdot(b[1:-1], b[2:] + b[:-2]) / (2 * np.vdot(b[1:-1], b[1:-1]).real)
-        omega = np.arccos(cosine) / (every * dt)
-        return (self.off(omega), self.off(2 / dt * np.sin(0.5 * dt * omega))), int(time / dt)
+    apart = float(np.abs(np.subtract(found[:coarse], found[fine:])).max())
+    across = TIME / np.array([steps[0], steps[-1]])
+    theory = [("order 2", 2e-4 * (steps[0] / TIME * across) ** 2, across)]
+    orders = [fit_order(points, name, 2, least=100 * reference_error) for name in ("LAMMPS", "NumPy")]
+    return study_of("trajectory", points, reference_error, {"apart": apart}, theory, orders=orders)
 
 
 def growth(settings: Settings) -> Study:
-    """The growth rate of D in a packing above its onset: runs in both arithmetics over the time step, as they are and
-    with the dispersion taken out, and K's eigenvalue."""
-    equilibrium, time = settings.at(0.024), 5.0 if settings.quick else 10.0
-    mode = FastestMode(equilibrium.packing, 1e-8)
-    fine_mode = FastestMode(compensate(equilibrium).packing, 1e-12)
-    steps = (mode.limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])).tolist()
-    with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
-        runs: list[Run[tuple[float, ...]]] = [("", dt, partial(mode.run, engine, dt, time)) for dt in steps]
-        runs += [(COMPENSATED_SUFFIX, dt, partial(fine_mode.run, fine_engine, dt, time)) for dt in steps]
-        rate = partial(spectrum, mode.packing)
-        runs.append(("eigenvalue of K, no run", None, lambda: ((mode.off(0.5j * rate().growth_rate()),), None)))
-        (*raw, alone), errors = timed(runs, settings, lambda errors: errors[0])
-    points = [point._replace(method=RUN + point.method) for point in raw]
-    pairs = zip(raw, errors[:-1], strict=True)
-    points += [point._replace(method=RUN_CORRECTED + point.method, error=both[1]) for point, both in pairs]
-    points.append(alone)
-    noise, careful_noise = (
-        float(np.median([point.error for point in points if point.method == RUN_CORRECTED + suffix]))
-        for suffix in ("", COMPENSATED_SUFFIX)
-    )
+    """The growth rate of D in a packing above its onset: runs in compensated arithmetic over the time step, as they are
+    and with the dispersion taken out."""
+    packing, time = compensate(settings.at(0.024)).packing, 5.0 if settings.quick else 10.0
+    sparse, active = dynamical_matrix(packing)
+    matrix = sparse.toarray()
+    values, left, right = eig(matrix, left=True, right=True)
+    k = int(np.argmin(np.sqrt(values).imag))
+    omega, limit = complex(np.sqrt(values[k])), stable_timestep(float(np.sqrt(np.abs(values).max())))
+    exact, condition = 2 * abs(omega.imag), 1 / abs(np.vdot(left[:, k], right[:, k]))
+    resolution = float(unit_rounding(matrix) * condition / abs(omega) / exact)
+    root = np.sqrt(np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass]))
+    displacement, onto = np.zeros((2, len(root)), dtype=np.complex128)
+    displacement[active], onto[active] = right[:, k], left[:, k]
+    start = displacement.real / root
+    start *= AMPLITUDE / np.abs(start).max()
+
+    def off(omega: complex) -> float:
+        """Relative error of a growth rate, no less than the rounding of a number."""
+        return max(abs(2 * abs(omega.imag) / exact - 1), float(np.finfo(float).eps))
+
+    with Engine(packing) as engine:
+
+        def run(dt: float) -> tuple[tuple[float, ...], int]:
+            """Errors of the rate that a run shows, as it is, and with the dispersion taken out; and its steps."""
+            every = max(1, round(0.25 * np.pi / omega.real / dt))  # an eighth of a period
+            engine.restore(engine.displace(packing, start))
+            signal = []
+            with engine.undamped(dt) as dynamics:
+                for _ in range(max(4, int(time / dt / every))):
+                    motion = dynamics.advance(every)
+                    velocity = np.concatenate([*motion.velocity.T, packing.radius * motion.spin])
+                    signal.append(np.vdot(onto, root * velocity))
+            b = np.array(signal)
+            cosine = np.vdot(b[1:-1], b[2:] + b[:-2]) / (2 * np.vdot(b[1:-1], b[1:-1]).real)
+            seen = np.arccos(cosine) / (every * dt)
+            return (off(seen), off(2 / dt * np.sin(0.5 * dt * seen))), int(time / dt)
+
+        steps = (limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])).tolist()
+        runs: list[Run[tuple[float, ...]]] = [(RUN, dt, partial(run, dt)) for dt in steps]
+        points, errors = timed(runs, settings, lambda errors: errors[0])
+    corrected = zip(points, errors, strict=True)
+    points += [point._replace(method=RUN_CORRECTED, error=both[1]) for point, both in list(corrected)]
+    noise = float(np.median([point.error for point in points if point.method == RUN_CORRECTED]))
     curve = np.geomspace(steps[-1], steps[0], 60)
-    predicted = [mode.off(complex(discrete_frequency(mode.omega**2, dt))) for dt in curve.tolist()]
-    theory = [("velocity Verlet on a frozen K", predicted, curve), ("rounding of K", mode.resolution, ())]
-    order = fit_order(points, RUN + COMPENSATED_SUFFIX, 2, least=10 * careful_noise, most=0.01)
-    numbers = {"mode": mode, "fine_mode": fine_mode, "length": time, "noise": noise, "careful_noise": careful_noise}
-    numbers |= {"slower": 2 / mode.limit / abs(mode.omega), "spectrum": max(points[-1].error, mode.resolution)}
-    return study_of("growth", points, mode.resolution, numbers, theory, orders=[order])
+    predicted = [off(complex(discrete_frequency(omega**2, dt))) for dt in curve.tolist()]
+    theory = [("velocity Verlet on a frozen K", predicted, curve), ("rounding of K", resolution, ())]
+    order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
+    numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}
+    numbers |= {"slower": 2 / limit / abs(omega), "resolution": resolution}
+    return study_of("growth", points, resolution, numbers, theory, orders=[order])

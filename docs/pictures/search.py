@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
 from faultgouge.analysis.windows import Motions, System
-from faultgouge.analysis.windows.edges import TrackPoint
+from faultgouge.analysis.windows.edges import TrackPoint, track_point
 from faultgouge.analysis.windows.search import lowest
 from faultgouge.figures.style import INK, STYLE
 
@@ -40,7 +40,7 @@ def turning(fx: float) -> np.ndarray:
 
 def discriminant(operator: Operator, fx: float) -> float:
     """D of the two modes next to 10."""
-    return float(pair_at(operator, fx, fx + 1.0).numbers[1].real)
+    return float(pair_at(operator, fx, fx + 1.0)[1][1].real)
 
 
 def pair_at(operator: Operator, fx: float, other: float) -> TrackPoint:
@@ -49,7 +49,7 @@ def pair_at(operator: Operator, fx: float, other: float) -> TrackPoint:
     state = Motions.of(here)
     drift = state.slopes(there)
     near = np.argsort(np.abs(state.values - 10.0))
-    return TrackPoint.of(state, drift, *([near[0]] if state.grows[near[0]] else near[:2]))
+    return track_point(state, drift, *([near[0]] if state.grows[near[0]] else near[:2]))
 
 
 def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
@@ -62,7 +62,7 @@ def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
     axes.axhline(0, color=INK, linewidth=0.5)
     axes.fill_between(loads, 0, values, where=values < 0, color="C3", alpha=0.3, linewidth=0)
     ends = [pair_at(operator, 0.0, 1.0), pair_at(operator, 1.0, 0.0)]
-    numbers = [(float(end.numbers[1].real), float(end.slopes[1].real)) for end in ends]
+    numbers = [(float(value[1].real), float(slope[1].real)) for _, value, slope in ends]
     reach = np.array([-0.09, 0.09])
     for end, (value, slope) in zip(ends, numbers, strict=True):
         axes.plot(end.fx + reach, value + slope * reach, color="C1", linewidth=1.6)

@@ -4,14 +4,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
-from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
+from ...analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
 from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence
@@ -113,10 +113,6 @@ class GeneratedPacking(Section):
                 "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
                 "leave it out, or give a pile that stands by itself as packing.file",
             )
-        try:
-            self.start()
-        except ValueError as error:
-            raise refusal_sentence("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
     def start(self, draw: int = 0) -> Disks:
@@ -150,33 +146,23 @@ class StoredPacking(Section):
 
     @field_validator("file")
     @classmethod
-    def _check_file(cls, file: Path, info: ValidationInfo) -> Path:
+    def _absolute(cls, file: Path, info: ValidationInfo) -> Path:
         folder: Path = (info.context or {}).get("folder", Path())
-        path = Path(os.path.realpath(folder / file))  # Path.resolve fails on a loop of links
-        try:
-            if not is_hdf5(path):
-                format_of(path)
-        except OSError as error:
-            says = f"cannot be read at {path} ({error.strerror}): correct the name"
-            raise refusal_sentence("", f'= "{file}" {says}') from None
-        except PackingFileError as error:
-            raise refusal_sentence("", f'= "{file}" is refused: {str(error).rstrip(".")}') from None
-        return path
+        return Path(os.path.realpath(folder / file))  # Path.resolve fails on a loop of links
 
     @model_validator(mode="after")
     def _readable(self) -> "StoredPacking":
-        if is_hdf5(self.file):
-            for key in ("top", "frame"):
-                if getattr(self, key) is not None:
-                    raise refusal_sentence(
-                        key, "cannot stand beside a run.h5, whose first frame is taken as it is: leave it out"
-                    )
-            return self
         try:
-            upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
-        except BadInputError as error:
-            says = str(error).rstrip(".")
-            raise refusal_sentence("file", f'= "{self.file.name}" is refused: {says}') from None
+            if not is_hdf5(self.file):
+                upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
+            elif self.top is not None or self.frame is not None:
+                raise BadInputError("a run.h5 is taken as it is, with its first frame: leave top and frame out")
+        except OSError as error:
+            says = f'= "{self.file.name}" cannot be read at {self.file} ({error.strerror}): correct the name'
+            raise refusal_sentence("file", says) from None
+        except (PackingFileError, BadInputError) as error:
+            says = f'= "{self.file.name}" is refused: {str(error).rstrip(".")}'
+            raise refusal_sentence("file", says) from None
         return self
 
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:
@@ -203,7 +189,13 @@ class StoredPacking(Section):
             return len(run.packing(0)) if len(run) else 0
 
 
-def kind_of_packing(section: Any) -> str:
-    """Which of the two a section [packing] is, by name of its tag."""
+def _kind(section: Any) -> str:
+    """The tag of a section [packing]."""
     stored = "file" in section if isinstance(section, Mapping) else isinstance(section, StoredPacking)
     return "stored" if stored else "generated"
+
+
+PackingSection: TypeAlias = Annotated[
+    Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")], Discriminator(_kind)
+]
+"""[packing], from a seed or from a file."""

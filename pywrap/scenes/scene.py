@@ -20,60 +20,51 @@ the feature. A command reads only some sections, and requires some of those
 length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
 Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 
-`refuse_impossible` finds numbers that no packing can bear: overlaps beyond the contact law, forces near the rounding of
-the coordinates. `refuse_endless` finds a command that would take years, more memory than there is, or a file that no
-disk holds.
+Numbers that no packing can bear are refused: overlaps beyond the contact law, forces near the rounding of the
+coordinates.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any, Literal
 
 from pydantic import (
     ConfigDict,
-    Discriminator,
     PrivateAttr,
-    Tag,
     ValidationError,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails
+from pydantic_core import PydanticCustomError
 
 from ...analysis import MindlinLaw
-from .command_sections import check_study_section, command_of, errors_in, require_sections, study_model, study_models
-from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
+from .command_sections import command_of, study_model, study_models
+from .packing_section import GeneratedPacking, PackingSection
 from .sections import Damping, Drive, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax, refuse_first
-from .units import Units, as_numbers, real_units
+from .units import Units, in_units, real_units
 from .validation import (
-    KEYS_TO_ADD,
     SceneError,
     Section,
     digest_of,
     files_named,
     read_toml,
+    require_section,
     sections_in,
     sentence,
+    unknown_key,
 )
-
-Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
 DOUBLE_ROUNDING = 2.3e-16
 """Relative rounding of a double, rounded up."""
 
 STEPS_OF_A_YEAR = 1e13
 """A year of LAMMPS's steps: 2e-6 s each and more, on a core of 2020."""
-LARGEST_FILE = 1e13
-"""10 TB."""
-BYTES_IN_MEMORY = 4000
-"""Bytes for each disk, at the least: LAMMPS, the matrices and their factors."""
-BYTES_WRITTEN = 150
-"""Bytes of one equilibrium in run.h5, for each disk."""
+
 ROUNDING_LIMIT = 1e-6
 """Rounding of a force, in units of F_y, beyond which no bed comes to rest: 30 disks do at 1e-7, and fly apart at
 5e-7."""
@@ -112,10 +103,7 @@ class Scene(Section):
     model_config = ConfigDict(extra="allow")
 
     precision: Literal["double", "compensated"] = "double"
-    packing: Annotated[
-        Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
-        Discriminator(kind_of_packing),
-    ]
+    packing: PackingSection
     law: Law
     load: Load
     relax: Relax = Relax()
@@ -126,17 +114,6 @@ class Scene(Section):
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _sections_of_studies(cls, sections: Any, info: ValidationInfo) -> Any:
-        if not isinstance(sections, Mapping):
-            return sections
-        others = sections.keys() - cls.model_fields.keys()
-        checked = {
-            name: check_study_section(str(name), sections[name], info.context) for name in sorted(others, key=str)
-        }
-        return {**sections, **checked}
 
     @field_validator("ramp", mode="before")
     @classmethod
@@ -156,12 +133,6 @@ class Scene(Section):
         """I_0 in I = I_0 m R^2, for dynamics, spectrum and onset alike: the key of [perturb], or the paper's 1."""
         return (self.perturb or self._inertia).inertia_factor
 
-    def __new__(cls, *path: object, **sections: object) -> Scene:
-        """Refuse a path, which pydantic would refuse without advice."""
-        if path:
-            raise SceneError("Scene takes sections by name: Scene.from_toml(path) reads a file.")
-        return super().__new__(cls)
-
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         refuse_first(self._cases())
@@ -169,37 +140,45 @@ class Scene(Section):
         return self
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that do not agree with others, for `refuse_first`."""
-        mu, ramp, perturb, drive, damping = self.law.mus[0], self.ramp, self.perturb, self.drive, self.damping
+        """Keys that do not agree with others, or that no packing can bear, for `refuse_first`."""
+        packing, fy, mu, ramp, perturb = self.packing, self.load.fy, self.law.mus[0], self.ramp, self.perturb
+        repulsion = MindlinLaw(self.law.kn, kt=0.0, mu=0.0, exponent=self.law.exponent)
+        overlap = float(repulsion.overlap_of_force(fy))
+        stiffness = float(repulsion.normal_stiffness(overlap))
         if perturb is not None:
             missing = "is missing: give it, or a section [ramp] in which the onset is sought"
             yield "perturb.fx", perturb.fx is None and ramp is None, missing
+            lightest = min(1.0, self.inertia_factor) * (getattr(packing, "mass", None) or 1.0)
+            steps = perturb.time / (perturb.time_step or 0.1 * math.sqrt(lightest / (6 * stiffness)))
+            says = f"= {perturb.time:g} takes {steps:.2g} time steps, a year and more: lower it, or raise the time_step"
+            yield "perturb.time", steps > STEPS_OF_A_YEAR, says
             if ramp and perturb.fx is not None:
                 says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
                 yield "perturb.fx", perturb.fx > max(0.0, ramp.first), says
             if isinstance(perturb.target, tuple):
-                disks, last = self.packing.disks, max(perturb.target)
-                yield "perturb.target", last >= disks, f"names disk {last}: name disks from 0 to {disks - 1}"
-        if (cannot := refuse_impossible(self)) is not None:
-            yield cannot[0], True, cannot[1]
-        needless = "has no mu to weaken: leave it out or give law.mu a value above 0"
-        yield "friction", self.friction and mu == 0, needless
-        if damping is not None:
-            overdamped = (
-                "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
-                'for it: set ramp.method = "newton", or leave [damping] out'
-            )
-            yield "damping", ramp and ramp.method == "overdamped", overdamped
-            says = f"= {damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
-            yield "damping.ct", damping.ct > 0 and mu == 0, says
-        if drive is not None:
+                last = max(perturb.target)
+                says = f"names disk {last}: name disks from 0 to {packing.disks - 1}"
+                yield "perturb.target", last >= packing.disks, says
+        if isinstance(packing, GeneratedPacking):
+            smallest, rounding = min(packing.radii), DOUBLE_ROUNDING * packing.width * stiffness / fy
+            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius "
+            says += f"{smallest:g}, where the contact law does not hold: lower it, or raise law.kn = {self.law.kn:g}"
+            yield "load.fy", not overlap < smallest, says
+            says = f"= {self.law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is "
+            says += f"{rounding:.1g} of F_y, and no packing comes to rest: lower it, or raise load.fy"
+            yield "law.kn", not rounding < ROUNDING_LIMIT, says
+        says = (
+            "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use for "
+        )
+        says += 'it: set ramp.method = "newton", or leave [damping] out'
+        yield "damping", self.damping and ramp and ramp.method == "overdamped", says
+        if (drive := self.drive) is not None:
             yield "drive", mu == 0, "needs friction, which holds the layer: give law.mu a value above 0"
-            if drive.at is not None:
-                end = drive.length(mu * self.load.fy)
-                says = f"= {drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
-                yield "drive.at", drive.at >= end, says
+            end = drive.length(mu * fy) if drive.at is not None else math.inf
+            says = f"= {drive.at} is after the end of the run, {end:g}: let the signal begin before"
+            yield "drive.at", (drive.at or 0.0) >= end, says
             slows = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
-            yield "damping.tau", drive.spring == "rigid" and damping and damping.tau is not None, slows
+            yield "damping.tau", drive.spring == "rigid" and self.damping and self.damping.tau is not None, slows
 
     @classmethod
     def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
@@ -247,24 +226,34 @@ class Scene(Section):
 
     @classmethod
     def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> Scene:
-        wanted = command_of(command)
-        context: dict[str, Any] = {"folder": folder}
+        if not isinstance(mapping, Mapping):
+            raise SceneError(f"{name}: a scene maps the names of sections to their keys: give a dict.")
+        wanted, context = command_of(command), dict[str, Any](folder=folder)
+        others = {key: model for key in mapping if key not in SECTIONS and (model := study_model(str(key)))}
+        sections = SECTIONS | {key: (model,) for key, model in others.items()}
+        # keys of all sections are checked, and first: a misspelled name makes the right one missing, too
+        if unknown := next(_unknown(mapping, sections), None):
+            raise SceneError(f"{name}: {unknown_key(unknown, SECTIONS | study_models())}.")
         try:
-            if isinstance(mapping, Mapping) and "units" in mapping:
-                mapping = as_numbers(mapping, folder, name, SECTIONS | _of_studies(mapping))
-            if wanted is not None and isinstance(mapping, Mapping):
-                _check_keys(mapping)
-                mapping = wanted.part(mapping)
-                if "perturb" not in wanted.reads:
-                    context["inertia"] = _Part.model_validate({"perturb": mapping.pop("perturb", {})}).perturb
-            scene = cls.model_validate(mapping, context=context)
-            require_sections(scene, wanted.needs if wanted else (), KEYS_TO_ADD)
-            return scene
+            mapping = mapping if wanted is None else wanted.part(mapping)
+            if "units" in mapping:
+                mapping = in_units(mapping, context)
+            alone = {key: model for key, model in others.items() if key in mapping}
+            if wanted is not None and "perturb" not in wanted.reads and "perturb" in mapping:
+                alone["perturb"] = Inertia
+            part = create_model("Part", **{key: (model, ...) for key, model in alone.items()})  # type: ignore[call-overload]
+            found = dict(part.model_validate(mapping, context=context))
+            context["inertia"] = found.pop("perturb", Inertia())
+            own = {key: section for key, section in mapping.items() if key not in alone}
+            scene = cls.model_validate(own | found, context=context)
+        except PydanticCustomError as error:
+            raise SceneError(f"{name}: {error}.") from None
         except ValidationError as error:
-            # A misspelled name makes the right one missing, too: the misspelling is the cause.
-            first = min(errors_in(error), key=lambda each: each["type"] != "extra_forbidden")
-            studies = study_models() if first["type"] == "extra_forbidden" else {}
-            raise SceneError(f"{name}: {sentence(first, SECTIONS | studies)}.") from None
+            first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+            raise SceneError(f"{name}: {sentence(first, sections)}.") from None
+        for need in wanted.needs if wanted else ():
+            require_section(getattr(scene, need, None), need)
+        return scene
 
     @property
     def files(self) -> dict[str, tuple[Path, ...]]:
@@ -292,33 +281,14 @@ class Scene(Section):
         return {**({"perturb": inertia} if inertia else {}), **sections}
 
 
-class _Part(Section):
-    """The keys of [perturb] that a command reads if it does not read the whole section."""
-
-    perturb: Inertia
-
-
-def _of_studies(mapping: Mapping[str, Any]) -> dict[str, tuple[type[Section], ...]]:
-    """The models of the sections of a scene that belong to studies."""
-    others = {name: study_model(str(name)) for name in mapping.keys() - Scene.model_fields.keys()}
-    return {name: (model,) for name, model in others.items() if model is not None}
-
-
-def _check_keys(mapping: Mapping[str, Any]) -> None:
-    """Refuse unknown sections and keys, also in sections that are not read."""
-    errors: list[InitErrorDetails] = []
-    sections = SECTIONS | _of_studies(mapping)
+def _unknown(mapping: Mapping[str, Any], sections: Mapping[str, tuple[type[Section], ...]]) -> Iterator[list[str]]:
+    """The names of unknown sections, and of unknown keys behind those of their sections."""
     for name, section in mapping.items():
-        if not (models := sections.get(name, ())):
-            if name not in Scene.model_fields:
-                errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
-        elif not isinstance(section, Mapping):
-            errors.append({"type": "dict_type", "loc": (name,), "input": section})
-        else:
-            unknown = [key for key in section if not any(key in model.model_fields for model in models)]
-            errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in unknown]
-    if errors:
-        raise ValidationError.from_exception_data("Scene", errors)
+        if name not in sections and name not in Scene.model_fields:
+            yield [str(name)]
+        elif name in sections and isinstance(section, Mapping):
+            known = {key for model in sections[name] for key in model.model_fields}
+            yield from ([name, str(key)] for key in section if key not in known)
 
 
 SECTIONS = {name: models for name, field in Scene.model_fields.items() if (models := sections_in(field.annotation))}
@@ -342,63 +312,3 @@ def scene_of(scene: object, command: str) -> Scene:
     if isinstance(scene, (str, Path)):
         return Scene.from_toml(scene, command=command)
     raise SceneError(f"{command} takes a Scene, or the path of its .toml file, and no {type(scene).__name__}.")
-
-
-def refuse_endless(scene: Scene, task: Task) -> None:
-    """Refuse a scene with which a command would not come to an end.
-
-    Raises SceneError if it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
-    """
-    disks, ramp, perturb = scene.packing.disks, scene.ramp, scene.perturb
-    equilibria = 1.0 + (ramp.length / ramp.step if ramp is not None and task not in ("settle", "perturb") else 0.0)
-    steps = 0.0
-    if perturb is not None and task in ("perturb", "reproduce"):
-        lightest = min(1.0, scene.inertia_factor) * (getattr(scene.packing, "mass", None) or 1.0)
-        usual = 0.1 * math.sqrt(lightest / (6 * _overlap_and_stiffness(scene)[1]))
-        steps = perturb.time / (perturb.time_step or usual)
-    memory, written = disks * BYTES_IN_MEMORY, disks * BYTES_WRITTEN * equilibria
-    installed = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-    if steps > STEPS_OF_A_YEAR:
-        found = f"{steps:.2g} time steps, a year and more: lower perturb.time, or raise perturb.time_step"
-    elif memory > installed:
-        found = f"{memory / 1e9:.2g} GB of memory, and this machine has {installed / 1e9:.2g}: take fewer disks"
-    elif task == "ramp" and written > LARGEST_FILE:
-        found = f"a file of {written / 1e12:.2g} TB: take a larger ramp.step, or fewer disks"
-    else:
-        return
-    raise SceneError(f"the scene asks {task} for {found}")
-
-
-def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
-    """The key whose number no packing can bear, and the rest of the sentence; None if there is no such key."""
-    packing, law, fy = scene.packing, scene.law, scene.load.fy
-    if not isinstance(packing, GeneratedPacking):
-        return None
-    if (at := packing.settle_at) is not None:
-        settling = {
-            "law": law.model_copy(update={"kn": at.kn or law.kn}),
-            "load": scene.load.model_copy(update={"fy": at.fy or fy}),
-            "packing": packing.model_copy(update={"settle_at": None}),
-        }
-        if (cannot := refuse_impossible(scene.model_copy(update=settling))) is not None:
-            return "packing.settle_at", f"does not settle, since {' '.join(cannot)}"
-    (overlap, stiffness), smallest = _overlap_and_stiffness(scene), min(packing.radii)
-    if not overlap < smallest:
-        return "load.fy", (
-            f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
-            f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
-        )
-    rounding = DOUBLE_ROUNDING * packing.width * stiffness / fy
-    if not rounding < ROUNDING_LIMIT:
-        return "law.kn", (
-            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
-            "and no packing comes to rest: lower it, or raise load.fy"
-        )
-    return None
-
-
-def _overlap_and_stiffness(scene: Scene) -> tuple[float, float]:
-    """Overlap and normal stiffness of a contact that carries F_y."""
-    law = MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)  # the repulsion alone
-    overlap = law.overlap_of_force(scene.load.fy)
-    return float(overlap), float(law.normal_stiffness(overlap))

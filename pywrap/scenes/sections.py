@@ -7,13 +7,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
 from ...analysis.packing.law import EXPONENTS, LEAST_RESCALED, known_exponents
-from ...analysis.responses.signals import Signal, SignalError, pulse, sweep
+from ...analysis.responses.signals import Signal, SignalError, pulse
 from .validation import (
     DASHPOT,
     FORCE,
@@ -23,6 +23,7 @@ from .validation import (
     TIME,
     VELOCITY,
     VISCOSITY,
+    WAVE,
     NamesFile,
     NotNegative,
     Number,
@@ -71,17 +72,10 @@ class Law(Section):
     exponent: float = 1.5
     history: Literal["total", "rescaled", "coulomb"] = "total"
 
-    @model_validator(mode="before")
-    @classmethod
-    def _kt_has_kn(cls, section: Any) -> Any:
-        if isinstance(section, Mapping) and "kt" in section and "kn" not in section:
-            raise refusal_sentence("kt", "stands without kn: give kn, in force / length^exponent, as well")
-        return section
-
     @field_validator("kt", mode="before")
     @classmethod
     def _share_of_kn(cls, kt: object, info: ValidationInfo) -> object:
-        if not isinstance(kt, str):
+        if not isinstance(kt, str) or "kn" not in kt:
             return kt
         if "kn" not in info.data:
             return 0.0  # kn is missing or refused, and that is what gets reported
@@ -90,15 +84,6 @@ class Law(Section):
         if denominator == 0:
             raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
         return numerator * info.data["kn"] / denominator
-
-    @field_validator("mu")
-    @classmethod
-    def _each_once(cls, mu: float | tuple[float, ...]) -> float | tuple[float, ...]:
-        if isinstance(mu, tuple) and len(set(mu)) < len(mu):
-            raise refusal_sentence(
-                "", f"= [{', '.join(f'{each:g}' for each in mu)}] names one value twice: give each once"
-            )
-        return mu
 
     @field_validator("exponent")
     @classmethod
@@ -198,8 +183,8 @@ class Ramp(Section):
     step: Annotated[Positive, FORCE]
     until: Annotated[
         Number | Annotated[tuple[Number, ...], Field(min_length=1, strict=False)],
-        FORCE,
         rule("give a force, or a list of forces between which F_x goes"),
+        FORCE,
     ]
     method: Literal["newton", "overdamped"] = "newton"
     force_tolerance: Annotated[Positive | None, FORCE] = None
@@ -259,20 +244,33 @@ def refuse_first(cases: Iterable[tuple[str, object, str]]) -> None:
             raise refusal_sentence(key, advice)
 
 
-class WithSignal(Section):
-    """A section with a signal, which is one of its `KINDS` or a file."""
+SignalKeys: TypeAlias = Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]
 
-    KINDS: ClassVar[tuple[str, ...]] = ("pulse",)
+
+class WithSignal(Section):
+    """A section with a signal, "pulse" or a file: of each kind the keys that it needs, and those that it takes."""
+
+    TAKES: ClassVar[SignalKeys] = {}
 
     @field_validator("signal", check_fields=False)
     @classmethod
     def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
-        if signal is None or signal in cls.KINDS:
+        if signal in (None, "pulse"):
             return signal
-        return str(((info.context or {}).get("folder", Path()) / signal).resolve())
+        return str(((info.context or {}).get("folder", Path()) / str(signal)).resolve())
 
     @model_validator(mode="after")
     def _complete(self) -> "WithSignal":
+        signal = getattr(self, "signal", None)
+        kind = signal if signal in (None, "pulse") else "file"
+        of = {None: "a section without signal", "pulse": 'signal = "pulse"', "file": "a signal from a file"}[kind]
+        needs, takes = self.TAKES[kind or ""]
+        for key in dict.fromkeys(key for keys in self.TAKES.values() for each in keys for key in each):
+            value = getattr(self, key)
+            if key in needs and (value is None or not (value or key == "at")):
+                raise refusal_sentence(key, f"is missing: {of} needs it, above 0")
+            if key not in (*needs, *takes) and value != type(self).model_fields[key].default:
+                raise refusal_sentence(key, f"does not belong to {of}: leave it out")
         refuse_first(self._cases())
         try:
             self.forcing()
@@ -281,7 +279,7 @@ class WithSignal(Section):
         return self
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that are missing or do not belong here, for `refuse_first`."""
+        """Keys that are missing or do not fit, for `refuse_first`."""
         raise NotImplementedError
 
     def forcing(self) -> Signal | None:
@@ -290,8 +288,7 @@ class WithSignal(Section):
 
 
 class Perturb(WithSignal, Inertia):
-    """[perturb] an undamped run from an equilibrium, and the forcing in it: a force a cos(omega t), a pulse, a sweep of
-    frequency, or a signal from a file.
+    """[perturb] an undamped run from an equilibrium, and its forcing: a cos(omega t), a pulse, or a signal of a file.
 
     Its keys are that of `Inertia`, and these.
 
@@ -310,13 +307,10 @@ class Perturb(WithSignal, Inertia):
         a, force on each forced disk along x, or, on the floor, largest velocity of the floor; 0 means no forcing. The
         paper's is 1e-12.
     omega : float or None
-        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks, of a sweep the first
-        one. The paper's is 0.01.
-    omega_end : float or None
-        The last frequency of a sweep, at the end of the run, 1 / time.
+        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks. The paper's is 0.01.
     signal : str or None
-        "pulse", "sweep", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative
-        path counts from the folder of the scene's file. None: a cos(omega t).
+        "pulse", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative path counts
+        from the folder of the scene's file. None: a cos(omega t).
     channel : str or None
         Which trace of a record with several: the end of its id, such as "EHZ".
     scale, stretch : float or None
@@ -327,7 +321,11 @@ class Perturb(WithSignal, Inertia):
         What of the floor's motion the signal gives; None is its velocity.
     """
 
-    KINDS = ("pulse", "sweep")
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ("amplitude", "omega")),
+        "pulse": (("amplitude", "omega"), ("on", "quantity")),
+        "file": ((), ("on", "quantity", "channel", "scale", "stretch")),
+    }
 
     fx: Annotated[NotNegative | None, FORCE] = None
     time: Annotated[Positive, TIME]
@@ -336,36 +334,20 @@ class Perturb(WithSignal, Inertia):
         Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1, strict=False)],
         rule('give "top", "all" or a list of disks, counted from 0'),
     ] = "top"
-    amplitude: Annotated[NotNegative, FORCE] = 0.0
+    on: Literal["layer", "floor"] | None = None
+    amplitude: Annotated[NotNegative, WAVE] = 0.0
     omega: Annotated[NotNegative | None, FREQUENCY] = None
-    omega_end: Annotated[Positive | None, FREQUENCY] = None
     signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
     scale: Number | None = None
     stretch: Positive | None = None
-    on: Literal["layer", "floor"] | None = None
     quantity: Literal["velocity", "acceleration", "displacement"] | None = None
 
-    @property
-    def _from_file(self) -> bool:
-        return self.signal is not None and self.signal not in self.KINDS
-
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        for key in ("amplitude", "omega", "omega_end"):
-            wrong = self._from_file and getattr(self, key)
-            yield key, wrong, "cannot stand beside a signal from a file: scale and stretch take its place"
-        for key in ("channel", "scale", "stretch"):
-            wrong = not self._from_file and getattr(self, key)
-            yield key, wrong, "belongs to a signal from a file: a forcing without one has amplitude and omega"
-        yield "omega_end", self.omega_end and self.signal != "sweep", 'belongs to signal = "sweep": leave it out'
         of_floor = 'belongs to on = "floor": the signal is the force on the layer otherwise'
         yield "quantity", self.quantity and self.on != "floor", of_floor
-        yield "on", self.on and self.signal is None, 'stands without signal: give signal = "pulse", "sweep" or a file'
         forced = self.amplitude > 0 and self.omega is None
         yield "omega", forced, "is missing: an amplitude needs the frequency of its forcing"
-        for key in ("amplitude", "omega", *(["omega_end"] if self.signal == "sweep" else [])):
-            wrong = self.signal in self.KINDS and not getattr(self, key)
-            yield key, wrong, f"is missing: a {self.signal} needs one above 0"
         short = self.time_step is not None and self.time < self.time_step
         yield "time", short, f"= {self.time} is shorter than one step, {self.time_step}: run longer"
 
@@ -378,13 +360,11 @@ class Perturb(WithSignal, Inertia):
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor; None for a cosine."""
         if self.signal is None:
             return None
-        if self._from_file:
+        if self.signal == "pulse":
+            signal = pulse(self.omega or 0.0).scale_by(self.amplitude)
+        else:
             scale = 1.0 if self.scale is None else self.scale
             signal = read_signal(self.signal, self.channel).scale_by(scale, self.stretch or 1.0)
-        else:
-            omega, end = self.omega or 0.0, self.omega_end or 0.0
-            wave = pulse(omega) if self.signal == "pulse" else sweep(omega, end, self.time)
-            signal = wave.scale_by(self.amplitude)
         derivatives = {"displacement": 2, "velocity": 1, "acceleration": 0}[self.quantity or "velocity"]
         for _ in range(derivatives if self.on == "floor" else 0):
             signal = signal.derivative()
@@ -395,7 +375,7 @@ class Perturb(WithSignal, Inertia):
 
         Raises SignalError if rows of the file are closer than the time step, or the whole signal is.
         """
-        signal = self.forcing() if self._from_file else None
+        signal = None if self.signal == "pulse" else self.forcing()
         if signal is not None and signal.shortest < dt:
             raise SignalError(
                 f"perturb.signal has rows that are {signal.shortest:.3g} apart, and the time step is {dt:.3g}: a run "
@@ -423,9 +403,9 @@ class Friction(Section):
     w: Positive = 0.4
     mu_ss: NotNegative = 0.8
     v0: Annotated[
-        NotNegative | Literal["calibrated"], VELOCITY, rule('give a velocity of at least 0, or "calibrated"')
+        NotNegative | Literal["calibrated"], rule('give a velocity of at least 0, or "calibrated"'), VELOCITY
     ] = "calibrated"
-    v_ss: Annotated[Positive | str, VELOCITY, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"')]
+    v_ss: Annotated[Positive | str, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"'), VELOCITY]
 
     @field_validator("v_ss")
     @classmethod
@@ -473,6 +453,9 @@ PROBE_SCALE = 1e-12
 and far below every force."""
 
 
+Stage: TypeAlias = tuple[Annotated[Number, VELOCITY], Annotated[Positive, TIME]]
+
+
 class Drive(WithSignal):
     """[drive] a spring whose far end moves along x draws the upper layer.
 
@@ -507,14 +490,16 @@ class Drive(WithSignal):
         What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
     """
 
-    spring: Annotated[Positive | Literal["rigid"], SPRING, rule('give a stiffness above 0, or "rigid"')]
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ()),
+        "pulse": (("at", "omega"), ("scale", "on")),
+        "file": (("at",), ("scale", "on")),
+    }
+
+    spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
     velocity: Annotated[Number | None, VELOCITY] = None
     protocol: Annotated[
-        Annotated[
-            tuple[Annotated[tuple[Number, Positive], Field(strict=False)], ...], Field(min_length=1, strict=False)
-        ]
-        | None,
-        (VELOCITY, TIME),
+        Annotated[tuple[Annotated[Stage, Field(strict=False)], ...], Field(min_length=1, strict=False)] | None,
         rule("give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"),
     ] = None
     until: Annotated[Positive | None, TIME] = None
@@ -523,8 +508,8 @@ class Drive(WithSignal):
     signal: Annotated[str | None, NamesFile()] = None
     at: Annotated[NotNegative | None, TIME] = None
     omega: Annotated[Positive | None, FREQUENCY] = None
-    scale: Annotated[Number, FORCE] = 1.0
     on: Literal["layer", "floor"] = "layer"
+    scale: Annotated[Number, WAVE] = 1.0
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
         rigid, endless = self.spring == "rigid", self.until is None and self.protocol is None
@@ -538,13 +523,6 @@ class Drive(WithSignal):
         yield "until", endless and rigid, no_slips
         no_spring = "needs a spring: a rigid drive moves the layer at its velocity, and counts no slips"
         yield "slips", rigid and self.slips is not None, no_spring
-        for key in ("at", "omega"):
-            alone = self.signal is None and getattr(self, key) is not None
-            yield key, alone, 'stands without signal: give signal = "pulse" or a file'
-        begins = self.signal is not None and self.at is None
-        yield "at", begins, "is missing: give the time at which the signal begins"
-        one = (self.signal == "pulse") != (self.omega is not None)
-        yield "omega", one, 'is the frequency of signal = "pulse": give both or neither'
 
     @property
     def stages(self) -> tuple[tuple[float, float], ...]:

@@ -1,10 +1,9 @@
 r"""Real units: the physical values of the numbers in a scene for grains of a given size and material.
 
 A scene has three units that its numbers do not fix. The grains fix them: the unit of length is the diameter
-:math:`2 R_1` of the smallest disks, and the unit of mass is the mass of a smallest grain, a sphere or (with a thickness
-h) a cylinder,
+:math:`2 R_1` of the smallest disks, and the unit of mass is the mass of a smallest grain, a sphere,
 
-.. math:: M = \tfrac43 \pi R_1^3 \rho \quad\text{or}\quad M = \pi R_1^2 h \rho ,
+.. math:: M = \tfrac43 \pi R_1^3 \rho ,
 
 and the unit of time follows from Hertz's contact of two such spheres (K. L. Johnson, *Contact Mechanics*, 1985, section
 4.2),
@@ -12,27 +11,27 @@ and the unit of time follows from Hertz's contact of two such spheres (K. L. Joh
 .. math:: F = \tfrac43 E^* \sqrt{R_1/2}\, \delta^{3/2}, \qquad E^* = \frac{E}{2 (1 - \nu^2)},
     \qquad\text{so}\qquad k = \frac{E \sqrt{2 R_1}}{3 (1 - \nu^2)} ,
 
-which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`. A cylinder has no contact law with the exponent 3/2;
-its thickness changes only the mass and the area.
+which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`.
 
-**Stress.** The upper layer has n disks above the area W h, W the width of the box and h the thickness, or :math:`2
-R_1`. The force F_y on each of them is the overburden :math:`n F_y / (W h)`, F_x the shear stress, and F_x/F_y their
-ratio. The ratio k_n/F_y of a scene therefore corresponds to a depth, and a given overburden must agree with that of the
-scene.
+**Stress.** The upper layer has n disks above the area :math:`2 W R_1`, W the width of the box: the layer is as thick as
+a smallest grain. The force F_y on each of them is the overburden :math:`n F_y / (2 W R_1)`, F_x the shear stress, and
+F_x/F_y their ratio. The ratio k_n/F_y of a scene therefore corresponds to a depth, and a given overburden must agree
+with that of the scene.
 
-**Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(W h)`. A plane shear wave in the
-rock, with the modulus :math:`G = E/2(1 + \nu)`, has this stress at the strain :math:`\sigma/G` and the ground velocity
-:math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground velocity A/omega.
+**Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(2 W R_1)`. A plane shear wave in
+the rock, with the modulus :math:`G = E/2(1 + \nu)`, has this stress at the strain :math:`\sigma/G` and the ground
+velocity :math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground
+velocity A/omega.
 
 **Dissipation.** The restitution e of two smallest grains that collide head on at a given velocity follows from
 :math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; the restitution falls as the velocity
 grows (N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity. The ratio
 :math:`Q = \omega/2|\mathrm{Re}\,s|` is the quality factor of a motion :math:`e^{st}`.
 
-**Quantities.** A scene with a section [units] may give each of its numbers as a text with a unit. The text is converted
-to the scene's own units before the scene is checked, and rounded to `DIGITS`, so that two scenes that say the same in
-other units have the same numbers. A stress on the layer ("10 MPa") is a force on each disk
-of the upper layer. A frequency in hertz is the angular frequency, 2 pi times that.
+**Quantities.** A scene with a section [units] may give each of its numbers as a text with a unit, which its key
+converts to the scene's own units and rounds to twelve digits, so that two scenes that say the same in other units have
+the same numbers. A stress on the layer ("10 MPa") is a force on each disk of the upper layer. A frequency in hertz is
+the angular frequency, 2 pi times that.
 
 If radii have units, the unit of length is the diameter of the smallest disks. If law.kn is left out, or is a text, it
 is the stiffness that fixes the unit of time: 2e5 where the smallest disks have diameter and mass one, as in the paper.
@@ -41,83 +40,32 @@ If load.fy is left out, it is the overburden on the area of a disk of the upper 
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import MindlinLaw, PackingFileError
-from ...analysis.files.formats.tables import unit_registry
-from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
-from .validation import (
-    FORCE,
-    HERTZ_EXPONENT,
-    LENGTH,
-    MASS,
-    STIFFNESS,
-    STRESS,
-    VELOCITY,
-    Powers,
-    SceneError,
-    Section,
-    is_number,
-    refusal_sentence,
-    sections_in,
-)
+from .packing_section import GeneratedPacking, PackingSection, StoredPacking
+from .validation import HERTZ_EXPONENT, Section, is_number, refusal_sentence, rounded, to_si
 
 MISMATCH = 0.01
 """Relative difference of the overburden from that of the scene up to which the two count as one."""
 
+STIFFNESS_OF_ONE = 2e5
+"""k_n where the smallest disks have diameter and mass one: the paper's."""
 
 SI = {
     "grain_diameter": "m",
     "density": "kg/m^3",
     "youngs_modulus": "Pa",
-    "thickness": "m",
     "overburden": "Pa",
     "impact_velocity": "m/s",
 }
-
-
-@lru_cache  # the scenes of a sweep have the same texts, and pint reads each in milliseconds
-def to_si(text: str, unit: str) -> float:
-    """A quantity such as "100 um" as a number of SI units.
-
-    Raises ValueError if it is no quantity, or one of another dimension: half a sentence with the reason.
-    """
-    from pint import PintError
-
-    try:
-        return float(unit_registry().Quantity(text).to(unit).magnitude)
-    except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
-        reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
-        raise ValueError(f"does not convert to {unit} ({reason})") from None
-
-
-def quantity(place: str, text: str, unit: str) -> float:
-    """A quantity somewhere in a scene as a number of SI units; a frequency in hertz as an angular frequency.
-
-    Raises ValueError if it is no quantity, or one of another dimension: a sentence without its full stop.
-    """
-    try:
-        number = to_si(text, unit)
-    except ValueError as error:
-        raise ValueError(f'{place} = "{text}" {error}: give a number with a unit of that kind') from None
-    return number * (2 * np.pi if re.search(r"[Hh]ertz|Hz", text) else 1.0)
-
-
-def is_stress(text: str) -> bool:
-    """Whether a text is a quantity such as "10 MPa"."""
-    try:
-        to_si(text, "Pa")
-    except ValueError:
-        return False
-    return True
 
 
 class Units(Section):
@@ -133,8 +81,6 @@ class Units(Section):
         Of the grains' material, and of the rock about the layer.
     poisson_ratio : float
         Of both.
-    thickness : str or None
-        Of the layer of disks; None: the grains are spheres, and the layer as thick as one.
     overburden : str or None
         Normal stress on the layer; None: whatever the scene has.
     restitution : float or None
@@ -147,22 +93,14 @@ class Units(Section):
     density: str
     youngs_modulus: str
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
-    thickness: str | None = None
     overburden: str | None = None
     restitution: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] | None = None
     impact_velocity: str | None = None
 
     @field_validator(*SI)
     @classmethod
-    def _converts(cls, text: str | None, info: Any) -> str | None:
-        if text is None:
-            return None
-        unit = SI[info.field_name]
-        try:
-            number = to_si(text, unit)
-        except ValueError as error:
-            raise refusal_sentence("", f'= "{text}" {error}: give a number with a unit of that kind') from None
-        if not 0 < number < np.inf:
+    def _converts(cls, text: str | None, info: ValidationInfo) -> str | None:
+        if text is not None and not 0 < to_si(text, SI[str(info.field_name)]) < math.inf:
             raise refusal_sentence("", f'= "{text}" is refused: give a quantity above 0')
         return text
 
@@ -177,11 +115,8 @@ class Units(Section):
 
     @property
     def grain_mass(self) -> float:
-        """Mass of a smallest grain, a sphere, or a cylinder with a thickness, kg."""
-        diameter = self.si("grain_diameter")
-        sphere = np.pi * diameter**3 / 6
-        volume = sphere if self.thickness is None else np.pi * diameter**2 / 4 * self.si("thickness")
-        return float(self.si("density") * volume)
+        """Mass of a smallest grain, kg."""
+        return float(self.si("density") * (np.pi * self.si("grain_diameter") ** 3 / 6))
 
     def si(self, key: str) -> float:
         """A quantity as a number of SI units."""
@@ -239,10 +174,6 @@ class RealUnits:
         """m/s of a velocity."""
         return velocity * self.length / self.time
 
-    def displacement(self, msd: float) -> float:
-        """Root of a mean square displacement, m."""
-        return float(np.sqrt(msd)) * self.length
-
     def ground_velocity(self, amplitude: float, omega: float, on: str) -> float:
         """m/s of the ground in a wave: a force on each disk of the upper layer, or an acceleration of the floor."""
         if on == "floor":
@@ -287,6 +218,73 @@ class Layer(NamedTuple):
     top: int
 
 
+class Grains(BaseModel):
+    """The sections that fix the units of a scene; without packing.settle_at, whose units they fix."""
+
+    units: Units
+    packing: PackingSection
+
+    @field_validator("packing", mode="before")
+    @classmethod
+    def _in_diameters(cls, packing: Any, info: ValidationInfo) -> Any:
+        if "units" not in info.data or not isinstance(packing, Mapping):
+            return packing
+        units, radii = info.data["units"], packing.get("radii", GeneratedPacking.model_fields["radii"].default)
+        numbers = [each for each in radii if is_number(each) and each > 0] if isinstance(radii, (list, tuple)) else []
+        if numbers and any(isinstance(each, str) for each in radii):
+            raise refusal_sentence("radii", "has numbers beside quantities: give all of them a unit, or none")
+        length = units.si("grain_diameter") / (2 * min(numbers, default=0.5))
+        assert info.context is not None
+        info.context["units"] = SimpleNamespace(length=length, mass=units.grain_mass, time=math.nan)
+        return {key: value for key, value in packing.items() if key != "settle_at"}
+
+
+def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, Any]:
+    """A scene as TOML contains it, with what its grains fix: k_n and F_y, where these are left out, and the mass.
+
+    The units are in the context from then on, in which keys convert their texts.
+
+    Raises
+    ------
+    ValidationError, PydanticCustomError
+        If [units] or [packing] is refused, or a quantity disagrees with the grains.
+    """
+    grains = Grains.model_validate(scene, context=context)
+    units, section, packing = grains.units, grains.packing, dict(scene["packing"])
+    law, load = scene.get("law", {}), scene.get("load", {})
+    if not (isinstance(law, Mapping) and isinstance(load, Mapping)):
+        return scene  # which is refused
+    check_exponent(law.get("exponent", HERTZ_EXPONENT))
+    if isinstance(section, GeneratedPacking):
+        smallest = 2 * min(section.radii) * context["units"].length
+        if abs(smallest / units.si("grain_diameter") - 1) > 1e-9:
+            raise refusal_sentence(
+                "packing.radii",
+                f"has smallest disks of {smallest:.6g} m, and units.grain_diameter = "
+                f'"{units.grain_diameter}" is their diameter: make them agree',
+            )
+        if isinstance(packing.get("mass"), str):
+            _agree("packing.mass", packing["mass"], "kg", units.grain_mass, "the mass of a smallest grain")
+            packing["mass"], section = 1.0, section.model_copy(update={"mass": 1.0})
+    layer = layer_of(section)
+    kn, own = law.get("kn", ""), rounded(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ_EXPONENT))
+    if isinstance(kn, str):
+        if kn:
+            _agree("law.kn", kn, "N/m**1.5", hertz_stiffness(units), "the stiffness of Hertz's contact of these grains")
+        law = {**law, "kn": own}
+    context["units"] = real = units_of(units, layer, kn if is_number(kn) and kn > 0 else own, fy=1.0)
+    if "fy" not in load and units.overburden is not None:
+        load = {**load, "fy": rounded(units.si("overburden") / real.overburden)}
+    return {**scene, "packing": packing, "law": law, "load": load}
+
+
+def _agree(key: str, text: str, unit: str, grains: float, what: str) -> None:
+    """Refuse a quantity that is not the one that the grains have."""
+    if abs(to_si(text, unit, key) / grains - 1) > MISMATCH:
+        says = f'= "{text}" is not {what}, {grains:.6g} {unit}: leave {key} out, or correct the keys of [units]'
+        raise refusal_sentence(key, says)
+
+
 def real_units(scene: Any) -> RealUnits | None:
     """The units of a `Scene`; None without a section [units].
 
@@ -301,15 +299,14 @@ def real_units(scene: Any) -> RealUnits | None:
         return None
     check_exponent(scene.law.exponent)
     real = units_of(units, layer_of(scene.packing), scene.law.kn, scene.load.fy)
-    if units.overburden is not None:
-        wanted = units.si("overburden")
-        if abs(real.overburden / wanted - 1) > MISMATCH:
-            raise refusal_sentence(
-                "units.overburden",
-                f"= {units.overburden} is not the load of the scene, which presses with "
-                f"{real.overburden:.4g} Pa: leave load.fy out, or set load.fy = "
-                f"{scene.load.fy * wanted / real.overburden:.6g}, or leave units.overburden out",
-            )
+    wanted = real.overburden if units.overburden is None else units.si("overburden")
+    if abs(real.overburden / wanted - 1) > MISMATCH:
+        raise refusal_sentence(
+            "units.overburden",
+            f"= {units.overburden} is not the load of the scene, which presses with {real.overburden:.4g} Pa: leave "
+            f"load.fy out, or set load.fy = {scene.load.fy * wanted / real.overburden:.6g}, or leave units.overburden "
+            "out",
+        )
     return real
 
 
@@ -318,9 +315,8 @@ def units_of(units: Units, layer: Layer, kn: float, fy: float) -> RealUnits:
     diameter, modulus = units.si("grain_diameter"), units.si("youngs_modulus")
     length = diameter / layer.diameter
     mass = units.grain_mass / layer.mass
-    time = float(np.sqrt(kn * mass / (hertz_stiffness(units) * np.sqrt(length))))
-    depth = diameter if units.thickness is None else units.si("thickness")
-    area = layer.width * length * depth / layer.top
+    time = math.sqrt(kn * mass / (hertz_stiffness(units) * math.sqrt(length)))
+    area = layer.width * length * diameter / layer.top
     shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
     return RealUnits(length, mass, time, area, shear_modulus, units.si("density"), fy)
 
@@ -328,7 +324,7 @@ def units_of(units: Units, layer: Layer, kn: float, fy: float) -> RealUnits:
 def hertz_stiffness(units: Units) -> float:
     """k of two smallest grains, N/m^(3/2)."""
     modulus, diameter = units.si("youngs_modulus"), units.si("grain_diameter")
-    return float(modulus * np.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2)))
+    return modulus * math.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2))
 
 
 def check_exponent(exponent: float) -> None:
@@ -340,19 +336,20 @@ def check_exponent(exponent: float) -> None:
 def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
     """The layer that a section [packing] describes; refused if the section gives no width."""
     if isinstance(section, GeneratedPacking):
-        diameter, mass = 2 * min(section.radii), section.mass or 1.0
-        width, top = section.width if section.periodic else None, section.top
+        width = section.width if section.periodic else None
+        layer = Layer(2 * min(section.radii), section.mass or 1.0, width or 0.0, section.top)
     else:
         try:
             packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
         except PackingFileError as error:
             says = f'= "{section.file.name}" is refused: {str(error).rstrip(".")}'
             raise refusal_sentence("packing.file", says) from None
-        k, width, top = packing.radius.argmin(), packing.box_length, int(packing.top.sum())
-        diameter, mass = 2 * float(packing.radius[k]), float(packing.mass[k])
+        k, width = packing.radius.argmin(), packing.box_length
+        smallest = 2 * float(packing.radius[k]), float(packing.mass[k])
+        layer = Layer(*smallest, width or 0.0, int(packing.top.sum()))
     if width is None:
         raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
-    return Layer(diameter, mass, width, top)
+    return layer
 
 
 def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
@@ -419,210 +416,3 @@ def dashpot(kn: float, wanted: float, mass: float, velocity: float) -> float:
     length = (mass * velocity**2 / kn) ** 0.4
     unit = mass * velocity / length**1.5
     return float(brentq(lambda c: restitution(kn, c * unit, mass, velocity) - wanted, 0.0, 50.0, xtol=1e-10)) * unit
-
-
-def quality_factor(rate: complex) -> float:
-    """Q = |Im s| / 2 |Re s| of a motion exp(s t); infinite without dissipation."""
-    return float(abs(rate.imag) / (2 * abs(rate.real))) if rate.real != 0 else float("inf")
-
-
-WAVES = {"perturb": "amplitude", "drive": "scale"}
-"""Sections with a wave, and their keys that are a velocity where the wave is on the floor."""
-
-OWN_WORDS = {"law.kt": "kn", "friction.v_ss": "v0", "friction.v0": "calibrated", "drive.spring": "rigid"}
-"""Texts of a scene that are no quantities, by a word in them."""
-
-DIGITS = 12
-"""Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
-right."""
-
-STIFFNESS_OF_ONE = 2e5
-"""k_n where the smallest disks have diameter and mass one: the paper's."""
-
-RawScene: TypeAlias = Mapping[str, Any]
-"""A scene as TOML contains it."""
-
-Dimensions: TypeAlias = Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]]
-"""Dimensions of the numbers of each section, or table in a section, by its path and by key."""
-
-
-def as_numbers(scene: RawScene, folder: Path, name: str, models: Mapping[str, tuple[type[Section], ...]]) -> RawScene:
-    """A scene as TOML contains it, with numbers in place of quantities, and with the values that its grains determine.
-
-    Parameters
-    ----------
-    scene : mapping
-        Sections by name, with [units].
-    folder : Path
-        From which a relative packing.file counts.
-    name : str
-        Of the scene, for messages.
-    models : mapping
-        The models of each section.
-
-    Returns
-    -------
-    mapping
-        The same mapping if it has nothing to convert. A scene that is refused anyway comes back
-        as it is: its check has the words for that.
-
-    Raises
-    ------
-    SceneError
-        If a quantity does not convert, or disagrees with the grains.
-    """
-    try:
-        units = Units.model_validate(scene["units"])
-        dimensions = dimensions_of(models)
-        given = "kn" in _section(scene, "law") and "fy" in _section(scene, "load")
-        if given and not any(_texts(path, key, scene) for path, keys in dimensions.items() for key in keys):
-            return scene
-        check_exponent(_section(scene, "law").get("exponent", HERTZ_EXPONENT))
-        converted = {**scene, "packing": _packing_in_numbers(units, _section(scene, "packing"))}
-    except ValidationError:
-        return scene
-    except ValueError as error:
-        raise SceneError(f"{name}: {error}.") from None
-    try:
-        own = {
-            key: value for key, value in converted["packing"].items() if key != "settle_at"
-        }  # whose units come later
-        model = StoredPacking if kind_of_packing(own) == "stored" else GeneratedPacking
-        layer = layer_of(model.model_validate(own, context={"folder": folder}))
-        return _convert(converted, units, layer, dimensions)
-    except ValidationError:
-        return converted
-    except ValueError as error:
-        raise SceneError(f"{name}: {error}.") from None
-
-
-def dimensions_of(models: Mapping[str, tuple[type[Section], ...]]) -> Dimensions:
-    """The dimension of each number, or of each pair of numbers, of some sections; all others have none."""
-    found: dict[str, dict[str, Any]] = {}
-    for path, each in models.items():
-        fields = [field for model in each for field in model.model_fields.items()]
-        found[path] = {key: mark for key, field in fields for mark in field.metadata if isinstance(mark, tuple)}
-        tables = {f"{path}.{key}": inner for key, field in fields if (inner := sections_in(field.annotation))}
-        found |= {name: {**keys} for name, keys in dimensions_of(tables).items()}
-    return found
-
-
-def _section(scene: RawScene, path: str) -> Mapping[str, Any]:
-    """A section, or a table in a section, by its path; empty if there is none."""
-    found: Any = scene
-    for name in path.split("."):
-        found = found.get(name) if isinstance(found, Mapping) else None
-    return found if isinstance(found, Mapping) else {}
-
-
-def _texts(path: str, key: str, scene: RawScene) -> bool:
-    """Whether a key, or a number in its list, is a quantity with a unit."""
-    own, values = OWN_WORDS.get(f"{path}.{key}"), [_section(scene, path).get(key)]
-    while any(isinstance(each, (list, tuple)) for each in values):
-        values = [each for one in values for each in (one if isinstance(one, (list, tuple)) else [one])]
-    return any(isinstance(each, str) and not (own and own in each) for each in values)
-
-
-def _packing_in_numbers(units: Units, section: Mapping[str, Any]) -> dict[str, Any]:
-    """[packing] with numbers for its lengths and its mass."""
-    if "file" in section:
-        return dict(section)
-    converted = dict(section)
-    diameter, radii = units.si("grain_diameter"), section.get("radii", GeneratedPacking.model_fields["radii"].default)
-    if not isinstance(radii, (list, tuple)) or not radii:
-        return converted
-    if any(isinstance(radius, str) for radius in radii):
-        if not all(isinstance(radius, str) for radius in radii):
-            raise ValueError("packing.radii has numbers beside quantities: give all of them a unit, or none")
-        length = diameter
-        converted["radii"] = radii = [_number("packing.radii", each, LENGTH, length=length) for each in radii]
-        if abs(2 * min(radii) - 1) > 1e-9:
-            raise ValueError(
-                f"packing.radii has smallest disks of {2 * min(radii) * diameter:.6g} m, and units.grain_diameter = "
-                f'"{units.grain_diameter}" is their diameter: make them agree'
-            )
-    elif not all(map(is_number, radii)) or min(radii) <= 0:
-        return converted
-    else:
-        length = diameter / (2 * min(radii))
-    if isinstance(section.get("width"), str):
-        converted["width"] = _number("packing.width", section["width"], LENGTH, length=length)
-    if isinstance(section.get("mass"), str):
-        own, given = units.grain_mass, quantity("packing.mass", section["mass"], _unit(MASS))
-        if abs(given / own - 1) > MISMATCH:
-            raise ValueError(
-                f'packing.mass = "{section["mass"]}" is not the mass of a smallest grain of units.density, '
-                f"{own:.6g} kg: leave packing.mass out, or correct one of them"
-            )
-        converted["mass"] = 1.0
-    return converted
-
-
-def _convert(scene: RawScene, units: Units, layer: Layer, dimensions: Dimensions) -> RawScene:
-    """A scene whose packing has numbers."""
-    law, load = dict(_section(scene, "law")), dict(_section(scene, "load"))
-    if isinstance(law.get("kn", ""), str):
-        law["kn"] = _stiffness(law.get("kn"), units, layer)
-    if not is_number(law["kn"]) or law["kn"] <= 0:
-        return scene
-    real = units_of(units, layer, law["kn"], fy=1.0)
-    if "fy" not in load and units.overburden is not None:
-        load["fy"] = _round(units.si("overburden") / real.overburden)
-    found: RawScene = {**scene, "law": law, "load": load}
-    for path, keys in dimensions.items():
-        texts = {key: powers for key, powers in keys.items() if _texts(path, key, found)}
-        if texts:
-            section = _section(found, path)
-            if section.get("on") == "floor":
-                texts = {key: VELOCITY if key == WAVES.get(path) else powers for key, powers in texts.items()}
-            numbers = {key: _numbers(f"{path}.{key}", section[key], of, real) for key, of in texts.items()}
-            found = _put(found, path, {**section, **numbers})
-    return found
-
-
-def _put(scene: RawScene, path: str, section: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene with a section, or a table in a section, replaced."""
-    name, _, below = path.partition(".")
-    return {**scene, name: _put(_section(scene, name), below, section) if below else section}
-
-
-def _stiffness(given: str | None, units: Units, layer: Layer) -> float:
-    """law.kn, if it is left out or is a quantity: a number that fixes the unit of time."""
-    hertz = hertz_stiffness(units)
-    if given is not None:
-        physical = quantity("law.kn", given, _unit(STIFFNESS))
-        if abs(physical / hertz - 1) > MISMATCH:
-            raise ValueError(
-                f'law.kn = "{given}" is not the stiffness of Hertz\'s contact of these grains, {hertz:.6g} N/m^1.5: '
-                "leave law.kn out, or correct units.youngs_modulus"
-            )
-    return _round(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ_EXPONENT))
-
-
-def _numbers(place: str, value: Any, powers: Powers | tuple[Powers, Powers], real: RealUnits) -> Any:
-    """A quantity as a number; of a list, or of a list of pairs, each. Numbers are returned unchanged."""
-    if len(powers) == 2:
-        pairs = [each for each in value if isinstance(each, (list, tuple)) and len(each) == 2]
-        if len(pairs) < len(value):
-            return value  # no list of pairs, and refused as such
-        return [[_numbers(place, each, of, real) for each, of in zip(pair, powers, strict=True)] for pair in pairs]
-    if isinstance(value, (list, tuple)):
-        return [_numbers(place, each, powers, real) for each in value]
-    if not isinstance(value, str):
-        return value
-    if powers == FORCE and is_stress(value):
-        return _round(quantity(place, value, _unit(STRESS)) / real.stress(1.0))
-    return _number(place, value, powers, real.mass, real.length, real.time)
-
-
-def _number(place: str, text: str, powers: Powers, mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
-    a, b, c = powers
-    return _round(quantity(place, text, _unit(powers)) / (mass**a * length**b * time**c))
-
-
-def _unit(powers: Powers) -> str:
-    return " * ".join(f"{unit}**({power:g})" for unit, power in zip(("kg", "m", "s"), powers, strict=True) if power)
-
-
-def _round(number: float) -> float:
-    return float(f"{number:.{DIGITS}g}") if np.isfinite(number) else number

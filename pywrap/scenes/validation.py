@@ -4,21 +4,34 @@ pydantic finds the errors in a section; `sentence` describes them in the terms o
 """
 
 import hashlib
+import math
 import os
+import re
 import reprlib
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WrapValidator,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
 from ...analysis.arrays import LARGEST, SMALLEST
 from ...analysis.files.atomic_write import read_plain, read_plain_text
+from ...analysis.files.formats.tables import unit_registry
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -39,38 +52,72 @@ Number: TypeAlias = Annotated[float, Field(allow_inf_nan=False), AfterValidator(
 Positive: TypeAlias = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(check_number)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(check_number)]
 
-Powers: TypeAlias = tuple[float, float, float]
-"""Powers of mass, length and time: the dimension of a number, in the annotation of its key; of pairs, two of them."""
-
 HERTZ_EXPONENT = 1.5
 """Exponent of Hertz's contact."""
 
-MASS: Powers = (1, 0, 0)
-LENGTH: Powers = (0, 1, 0)
-TIME: Powers = (0, 0, 1)
-FREQUENCY: Powers = (0, 0, -1)
-VELOCITY: Powers = (0, 1, -1)
-FORCE: Powers = (1, 1, -2)
-STRESS: Powers = (1, -1, -2)
-STIFFNESS: Powers = (1, 1 - HERTZ_EXPONENT, -2)
-DASHPOT: Powers = (1, 1 - HERTZ_EXPONENT, -1)
-VISCOSITY: Powers = (1, 0, -1)
-SPRING: Powers = (1, 0, -2)
+DIGITS = 12
+"""Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
+right."""
+
+OWN_WORDS = re.compile(r"\b(kn|v0|calibrated|rigid)\b")
+"""Words of texts that are no quantities: "2/7 kn", "10 v0"."""
+
+
+@lru_cache  # the scenes of a sweep have the same texts, and pint reads each in milliseconds
+def to_si(text: str, unit: str, key: str = "") -> float:
+    """A quantity such as "100 um" as a number of SI units; refused if it is none, or one of another dimension."""
+    from pint import PintError
+
+    try:
+        return float(unit_registry().Quantity(text).to(unit).magnitude)
+    except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
+        reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
+        says = f'= "{text}" does not convert to {unit} ({reason}): give a number with a unit of that kind'
+        raise refusal_sentence(key, says) from None
+
+
+def rounded(number: float) -> float:
+    """A number that was converted, to `DIGITS`."""
+    return float(f"{number:.{DIGITS}g}")
+
+
+Powers: TypeAlias = tuple[float, float, float]
+
+
+def _dimension(own: Powers, floor: Powers | None = None) -> BeforeValidator:
+    """Marks the dimension of a number, or of each in a list: a text with a unit becomes a number in units of the scene.
+
+    The dimension is given by powers of mass, length and time; `floor` is that where the key `on` of the section, which
+    stands before, has this value. The units are in the context of the validation; without them a text stays. A force
+    may also be a stress on the layer, and a frequency in hertz is an angular frequency.
+    """
+
+    def number_of(value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, (list, tuple)):
+            return [number_of(each, info) for each in value]
+        real = (info.context or {}).get("units")
+        if real is None or not isinstance(value, str) or OWN_WORDS.search(value):
+            return value
+        powers = floor if floor and info.data.get("on") == "floor" else own
+        if powers == (1, 1, -2):
+            with suppress(PydanticCustomError):
+                return rounded(to_si(value, "Pa") / real.stress(1.0))
+        turns = 2 * math.pi if re.search(r"[Hh]ertz|Hz", value) else 1.0
+        unit = " * ".join(f"{name}**({power:g})" for name, power in zip(("kg", "m", "s"), powers, strict=True) if power)
+        own_unit = real.mass ** powers[0] * real.length ** powers[1] * real.time ** powers[2]
+        return rounded(to_si(value, unit) * turns / own_unit)
+
+    return BeforeValidator(number_of)
+
+
+MASS, LENGTH, TIME = (_dimension(powers) for powers in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+FREQUENCY, VELOCITY, FORCE = (_dimension(powers) for powers in ((0, 0, -1), (0, 1, -1), (1, 1, -2)))
+STIFFNESS, DASHPOT = (_dimension((1, 1 - HERTZ_EXPONENT, power)) for power in (-2, -1))
+VISCOSITY, SPRING = (_dimension((1, 0, power)) for power in (-1, -2))
+WAVE = _dimension((1, 1, -2), floor=(0, 1, -1))
+"""A force on the layer, or a velocity of the floor."""
 
 T = TypeVar("T")
-
-KEYS_TO_ADD = {
-    "ramp": "step and until",
-    "perturb": "time",
-    "damping": "cn, ct or tau",
-    "drive": "spring, velocity and until",
-    "friction": "v0, the velocity at which friction weakens",
-}
-"""Keys that a section must have."""
-
-
-MISSING_KEY_ADVICE = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
-"""Advice for a missing key, where the advice is more than to add the key."""
 
 
 class SceneError(BadInputError):
@@ -131,23 +178,6 @@ def _digest(files: tuple[tuple[str, int, int, int], ...]) -> str:
     return hashlib.sha256(b"".join(read_plain(name) for name, *_ in files)).hexdigest()
 
 
-RULES = {
-    "greater_than": "give a number above {gt}",
-    "greater_than_equal": "give a number of at least {ge}",
-    "less_than": "give a number below {lt}",
-    "less_than_equal": "give a number of at most {le}",
-    "finite_number": "give a finite number",
-    "float_type": "give a number",
-    "int_type": "give a whole number",
-    "int_from_float": "give a whole number",
-    "bool_type": "give true or false",
-    "literal_error": "give {expected}",
-    "path_type": "give the name of a file, in quotes",
-    "tuple_type": "give a list of numbers",
-    "too_short": "give at least one number",
-}
-
-
 def refusal_sentence(key: str, says: str) -> PydanticCustomError:
     """An error of `key` of the section (or of the field, if empty) that is being checked."""
     return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
@@ -170,36 +200,23 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
     kind, context = error["type"], error.get("ctx", {})
     path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
     if kind == "extra_forbidden":
-        return _unknown_key(path, "stored" in error["loc"], sections)
+        return unknown_key(path, sections, "stored" in error["loc"])
     place = ".".join([*path, *filter(None, [context.get("key")])])
     if kind == "refused":
         return f"{place} {context['says']}"
     if kind == "missing":
         what = f"{path[1]} to [{path[0]}]" if len(path) > 1 else f"the section [{place}]"
-        return f"{place} is missing{MISSING_KEY_ADVICE.get(place, f': add {what}')}"
-    if not path:
-        return "a scene maps the names of sections to their keys, and this one is no mapping: give a dict"
+        return f"{place} is missing: add {what}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{place} is not a section: write [{place}] and its keys below"
-    advice = RULES[kind].format(**context) if kind in RULES else error["msg"]
+    advice = error["msg"].replace("Input", "it").replace("Tuple", "the list").replace("tuple", "list")
     if kind == "float_type" and isinstance(error["input"], str):
         advice += "; a number with a unit needs the section [units]"
     return f"{place} = {reprlib.repr(error['input'])} is refused: {advice}"
 
 
-SAME_MEANING = {
-    "friction": "mu",
-    "friction_coefficient": "mu",
-    "stiffness": "kn",
-    "particles": "disks",
-    "grains": "disks",
-    "force": "fy",
-    "pressure": "fy",
-}
-"""Words for a key that are not written like the key."""
-
-
-def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
+def unknown_key(path: list[str], sections: Mapping[str, tuple[type[Section], ...]], stored: bool = False) -> str:
+    """The key that nobody knows, and the nearest one, or the place where it belongs."""
     *above, key = path
     homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
     if not above:
@@ -214,9 +231,7 @@ def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[typ
         return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
     keys = [name for model in sections[section] for name in model.model_fields]
     (nearest,) = get_close_matches(key, keys, 1, cutoff=0)
-    if SAME_MEANING.get(key) in keys:
-        nearest = SAME_MEANING[key]
-    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest}"
+    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest} of {', '.join(keys)}"
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -232,5 +247,5 @@ def is_number(value: object) -> TypeGuard[float]:
 def require_section(section: T | None, name: str) -> T:
     """A section of a scene that a task cannot do without."""
     if section is None:
-        raise SceneError(f"the scene has no section [{name}]: add it, with {KEYS_TO_ADD[name]}")
+        raise SceneError(f"the scene has no section [{name}]: add it; `faultgouge init` writes a scene with every key")
     return section

@@ -21,8 +21,7 @@ from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene, scene_of
-from ..scenes.units import DIGITS
-from ..scenes.validation import SceneError
+from ..scenes.validation import DIGITS, SceneError
 from .change_load import change_load
 from .minimize_energy import settle_loose
 

@@ -60,7 +60,12 @@ class WeakLimit:
 def damping_block(packing: Packing, pair: Plane) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
     damping = mass_weighted(damping_matrix(force_bearing(packing)), packing)
-    return np.asarray(pair.block_of(damping @ pair.right))
+    return np.asarray(np.linalg.solve(pair.left.T @ pair.right, pair.left.T @ (damping @ pair.right)))
+
+
+def traceless(pair: Plane) -> Floats:
+    """N, the block of a pair less its mean, 1 / time^2."""
+    return np.asarray(pair.block - pair.mean * np.eye(2))
 
 
 def weak_limit(
@@ -92,7 +97,7 @@ def weak_limit(
     def h(fx: float) -> float:
         """Positive as long as weak damping damps both modes of the pair."""
         pair = pair_at(fx)
-        g, n = damping_block(equilibrium(fx).with_dissipation(cn, ct), pair), pair.traceless
+        g, n = damping_block(equilibrium(fx).with_dissipation(cn, ct), pair), traceless(pair)
         return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
     try:
@@ -108,7 +113,7 @@ def weak_limit(
     except NoEquilibriumError:
         return None
     g = damping_block(packing.with_dissipation(cn, ct), pair)
-    sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
+    sign = -np.sign(np.trace(traceless(pair) @ g))  # the mode in which the two terms cancel
     value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
     return WeakLimit(fx, float(np.sqrt(value)))
 
@@ -169,7 +174,7 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
     """
     pair = _follow_pair(lambda fx: packing, window)(window.fx_onset)
     along, across = (
-        np.trace(pair.traceless @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
+        np.trace(traceless(pair) @ damping_block(replace(packing, law=replace(packing.law, cn=n, ct=t)), pair))
         for n, t in ((1.0, 0.0), (0.0, 1.0))
     )
     return float(-along / across) if across else np.inf

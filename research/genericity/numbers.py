@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import Floats
-from faultgouge.studies.statistics import median_interval, quartiles, share, sign_test
+from faultgouge.studies.statistics import quartiles, share, sign_test
 from research.genericity.fits import shape, size_law
 from research.genericity.sets import FRICTION
 from research.genericity.table import Table
-from research.statistics import exponent
+from research.statistics import exponent, median_interval
 
 LOADS = (0.005, 0.01, 0.02, 0.03)
 """F_x below which shares of packings with an onset are given."""

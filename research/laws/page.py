@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from faultgouge.figures import render
-from faultgouge.studies.statistics import median, median_interval, share
+from faultgouge.studies.statistics import median, share
 from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
-from research.statistics import interval
+from research.statistics import interval, median_interval
 from research.tables import read_rows, write_json
 from research.yielding.page import SEEN_GROWTH, UNREST, rows_of
 

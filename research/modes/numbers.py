@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import Floats
-from faultgouge.studies.modes import QUANTITIES, Table, medians_over_load
+from faultgouge.studies.modes import QUANTITIES, medians_over_load
 from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS, RESTITUTIONS
+from research.modes.packing_rows import Table
 from research.statistics import exponent
 
 DRAWS = 2000
@@ -83,7 +84,7 @@ def _place(name: str) -> tuple[str, int]:
 
 def to_the_end(table: Table) -> dict[str, Any]:
     """The same, and F_x/F_y at the last equilibrium with the share just before it."""
-    found = medians_over_load(table, (*QUANTITIES, "omega"))
+    found = medians_over_load(table.rows, (*QUANTITIES, "omega"))
     ended = [row for row in table.rows if row["ends"] != "until"]
     found["ended"] = len(ended)
     found["end"] = median(ends(table))
@@ -93,9 +94,9 @@ def to_the_end(table: Table) -> dict[str, Any]:
 
 def losses(table: Table) -> dict[str, Any]:
     """Critical losses, which stop the pairs, and the share of packings in which motion grows for each restitution."""
-    found = medians_over_load(table, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
+    found = medians_over_load(table.rows, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
     if all("slowest" in load for row in table.rows for load in row["loads"]):
-        found |= {name: medians_over_load(table, (name,))[name] for name in ("omega", "slowest")}
+        found |= {name: medians_over_load(table.rows, (name,))[name] for name in ("omega", "slowest")}
     grows = {}
     for each in RESTITUTIONS:
         grows[f"{each:g}"] = [
@@ -229,7 +230,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
     seeds = set.intersection(*({row["seed"] for row in tables[name].rows} for name in HISTORIES.values()))
     matched = {law: _of_seeds(tables[name], seeds) for law, name in HISTORIES.items()}
     return {
-        law: medians_over_load(table, ("share", "least_q"))
+        law: medians_over_load(table.rows, ("share", "least_q"))
         | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
         for law, table in matched.items()
     }

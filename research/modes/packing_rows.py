@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from faultgouge.studies.modes import Table
+import numpy as np
+
+from faultgouge.analysis import Floats
 from faultgouge.studies.sweep import read_results
 from research.tables import SWEEP_ROWS, read_rows
 
@@ -18,6 +20,40 @@ DIGITS = 7
 
 LEFT_OUT = ("frequencies",)
 """What a line of a table lacks of a result: as long as the spectrum itself."""
+
+
+class Table(NamedTuple):
+    """One set of packings.
+
+    Attributes
+    ----------
+    name : str
+        Of the set, such as "force 100".
+    rows : tuple of dict
+        A packing each, by seed.
+    """
+
+    name: str
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def disks(self) -> int:
+        """Disks of each packing."""
+        words = self.name.split()
+        return int(words[-1]) if words[-1].isdecimal() else 100
+
+    @property
+    def loads(self) -> list[float]:
+        """F_x/F_y that some packing has borne."""
+        return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
+
+    def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
+        """The rows of a load, for every packing that has borne it."""
+        return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
+
+    def at(self, fx_over_fy: float, key: str) -> Floats:
+        """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
+        return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
 
 
 def condense(results: Path, tables: Path) -> None:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from faultgouge.analysis import Configuration, Floats, Packing, Signal, stable_timestep
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, WINDOW, windows_under_load
+from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, WINDOW, means_of_windows, windows_under_load
 from faultgouge.pywrap import Engine
 
 STEPS_OF_LOOK, LOOKS = 15, 400
@@ -66,7 +66,7 @@ def follow_one_sided(packing: Packing, count: int) -> tuple[float, Floats]:
     system, length = OneSidedSystem.of(packing), _length(packing.configuration)
     load = system.weight.T @ forces_on_coordinates(packing.configuration, "fx")
     followed = list(islice(windows_under_load(system, load, length), count))[FADE_WINDOWS:]
-    return length, np.array([window.drift_and_vibration(system) for window in followed])
+    return length, np.array([means_of_windows(system, [window]) for window in followed])
 
 
 def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> list[tuple[Floats, Floats]]:

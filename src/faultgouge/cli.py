@@ -10,20 +10,15 @@ ranks.
 
 from __future__ import annotations
 
-import io
+import errno
 import os
 import sys
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from .signal_guard import guarded, has_ended, is_root, raise_interrupt_in, size
-
-STANDARD_OUTPUT = "standard output"
-"""The name of the file behind it in errors."""
+from .signal_guard import guarded, has_ended, interrupted, is_root, size
 
 SECONDS_TO_MEET = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""
@@ -40,8 +35,6 @@ def main() -> NoReturn:
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     # pydantic would look for plugins of its own in the metadata of all installed packages
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    if os.name == "nt":
-        raise SystemExit("Error: faultgouge does not run on Windows itself: install Linux's wheel in WSL.")
     # the null device for closed standard streams, in whose place the next opened file would come otherwise
     while (number := os.open(os.devnull, os.O_RDWR)) < 3:
         pass
@@ -49,33 +42,7 @@ def main() -> NoReturn:
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r"))
-    if isinstance(out := sys.stdout, io.TextIOWrapper):
-        how = {name: getattr(out, name) for name in ("encoding", "errors", "line_buffering", "write_through")}
-        sys.stdout = StandardOutput(out.detach(), **how)
     guarded(_command)
-
-
-class StandardOutput(io.TextIOWrapper):
-    """Standard output, whose errors name it, as those of a full disk."""
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        with _naming_standard_output():
-            return super().write(text)
-
-    def flush(self) -> None:
-        """Write what is left."""
-        with _naming_standard_output():
-            super().flush()
-
-
-@contextmanager
-def _naming_standard_output() -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        error.filename = STANDARD_OUTPUT
-        raise
 
 
 def _command() -> None:
@@ -85,9 +52,10 @@ def _command() -> None:
         program()(standalone_mode=False)
         sys.stdout.flush()
     except Exception as error:
-        raise_interrupt_in(error)
-        if getattr(error, "filename", None) == STANDARD_OUTPUT:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what Python still writes at its end
+        if interrupted():
+            raise
+        if isinstance(error, OSError) and error.filename is None:  # of standard output: Python writes there at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         if isinstance(error, BrokenPipeError):  # whoever read the output has gone
             sys.exit(1)
         fail(error)
@@ -99,9 +67,9 @@ def fail(error: Exception) -> NoReturn:
     known_to_one = isinstance(error, OSError) or getattr(error, "one_rank", False)
     alone = size() > 1 and (known_to_one or not _all_are_here())
     if sentence and (alone or is_root()):
-        from rich.console import Console
+        import typer
 
-        Console(stderr=True, soft_wrap=True, highlight=False).print("[bold red]Error:[/bold red] ", end="")
+        typer.secho("Error: ", fg="red", bold=True, nl=False, err=True)
         print(sentence, file=sys.stderr, flush=True)
     if alone:
         from mpi4py import MPI
@@ -134,13 +102,9 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, FaultgougeError):
         return str(error).strip()
     if isinstance(error, OSError) and error.strerror:
-        if error.filename:
-            return f"{error.filename}: {error.strerror}"
-        try:
-            os.getcwd()
-        except FileNotFoundError:
-            return "the folder in which this command was called has been deleted: go to another one"
-        return error.strerror
+        if error.filename or error.errno == errno.ENOSPC:
+            return f"{error.filename or 'standard output'}: {error.strerror}"
+        return f"{error.strerror} (is the folder in which this command was called still there?)"
     if isinstance(error, MemoryError):
         what = str(error) or "a request was refused"
         return f"there is not enough memory ({what}): take a smaller packing, or a machine with more memory"

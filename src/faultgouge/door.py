@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .figures import PairCurve
-    from .figures.browser_page import Axis
     from .pywrap import Scene
 
 
@@ -86,11 +85,13 @@ def load(
     path = path_of(file, "load")
     if path.suffix == ".disks":
         return read_dump(path, frame=frame)
-    if path.suffix == ".in" or path.name.startswith("in."):
+    if is_deck(path):
         from .pywrap.granular.run_deck import run_deck
 
         return run_deck(path)
     if holds_configuration(path):
+        if frame not in (-1, 0):
+            raise BadInputError(f"{path} has one packing, and no frame {frame}: leave the frame out.")
         return read_configuration(path)
     if path.suffix == ".h5" or (path.is_file() and is_hdf5(path)):
         with RunFile(path) as run:
@@ -98,24 +99,27 @@ def load(
     from .pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(path, None if frame == -1 else frame)
-    if width is not None:
-        disks = replace(disks, box_length=width)
-    given = disks.given
-    law = law_of_parameters(given) if law is None and {"kn", "kt", "mu"} <= given.keys() else law
-    fy = given.get("fy") if fy is None else fy
-    missing = [name for name, value in (("law", law), ("fy", fy)) if value is None]
-    if law is None or fy is None:
+    given = dict(disks.given) | {key: each for key, each in (("fy", fy), ("fx", fx)) if each is not None}
+    if law is None and {"kn", "kt", "mu"} <= given.keys():
+        law = law_of_parameters(given)
+    missing = [name for name, known in (("law", law is not None), ("fy", "fy" in given)) if not known]
+    if law is None or missing:
         raise BadInputError(
             f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
             "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
         )
-    inertia_factor, drag_time = given.get("inertia_factor", 1.0), given.get("tau")
-    load = {"fx": given.get("fx", 0.0) if fx is None else fx, "fy": fy, "inertia_factor": inertia_factor}
+    disks = disks if width is None else replace(disks, box_length=width)
     if top == 0:
         layer = np.zeros(len(disks), dtype=np.bool_)
     else:
         layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
-    return packing_of(disks, law, layer, drag_time=drag_time, **load)
+    load = {key: given.get(key, usual) for key, usual in (("fx", 0.0), ("fy", 0.0), ("inertia_factor", 1.0))}
+    return packing_of(disks, law, layer, drag_time=given.get("tau"), **load)
+
+
+def is_deck(file: Path) -> bool:
+    """Whether a file has the name of a LAMMPS deck."""
+    return file.suffix == ".in" or file.name.startswith("in.")
 
 
 class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function to its users, as `range` is
@@ -143,7 +147,6 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
             with RunFile(self.path) as run:
                 self._count = len(run)
         else:
-            load(self.path)
             self._count = 1
 
     def __len__(self) -> int:
@@ -251,7 +254,6 @@ def draw(
     ax: Axes | None = None,
     mode: int | Literal["pair"] | None = None,
     color: str = "mobilised",
-    caption: bool = False,
 ) -> Figure:
     """Draw a packing with its force chains, or a mode of it.
 
@@ -266,8 +268,6 @@ def draw(
         pair, or the two real modes that are closest to meeting, of which `ax` shows the first.
     color : {"mobilised", "slip", "force", "none"}
         What the colour of a contact shows, without a mode.
-    caption : bool
-        Whether to print load and numbers of contacts above, in a new figure.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def draw(
     from .figures import draw_mode, draw_packing
 
     if mode is None:
-        return draw_packing(packing, ax, color, caption)
+        return draw_packing(packing, ax, color)
     if mode != "pair" and not isinstance(mode, int):
         raise BadInputError(f"draw takes the number of a mode, or 'pair', and not mode = {mode!r}.")
     return draw_mode(packing, None if mode == "pair" else mode, ax)
@@ -384,41 +384,31 @@ def view(
     >>> page.read_text()[:15]
     '<!doctype html>'
     """
-    from .figures.browser_page import loads_shown, write_view
+    from .analysis.responses.hysteresis import turning_points
+    from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
     from .figures.followed_pairs import seconds
+    from .figures.packing import in_words
 
     path, output = path_of(file, "view"), Path(output)
     if output.suffix.lower() != ".html":
         raise BadInputError(f"-o {output}: a page is an .html")
     last = load(path)
-    packings, series, axis = [last], None, None
-    if isinstance(last, Configuration):
-        particles = "disks" if last.dimension == 2 else "spheres"
-        title = f"{path.name}: {len(last)} {particles} as LAMMPS left them"
-    elif path.suffix == ".disks":
-        title = f"{path.name}: {len(last)} disks, Fₓ = {last.fx:g}"
-    else:
+    packings, series, axis, title = [last], None, None, f"{path.name}: {in_words(last)}"
+    if path.suffix != ".disks" and not holds_configuration(path):
         with RunFile(path) as run:
-            packings, axis, title = _of_run(run, loads_shown(len(last)) if loads is None else loads)
+            turns = [] if "time" in run.observables else turning_points(run.fx)
+            most = loads_shown(len(last)) if loads is None else loads
+            chosen = sorted({*equally_spaced(len(run), most), *turns})
+            packings = [packing_in(run, k) for k in chosen]
             series = run.series("undamped") if "undamped" in run.names_of_series else None
+            if "time" in run.observables:
+                axis = Axis("t", "time of the run", run.observable("time")[chosen])
+                title = f"{path.name}: states of a driven run of {len(last)} disks"
+            else:
+                span = " to ".join(f"{run.fx[k]:g}" for k in sorted({0, *turns, len(run) - 1}))
+                what = "undamped run" if series is not None else "equilibria"
+                title = f"{path.name}: {what} of {len(last)} disks, Fₓ = {span}"
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, progress, axis)
     return ViewedPage(output)
-
-
-def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:
-    """The packings of a page, what changes from one to the next, and the title of the page."""
-    from .analysis.responses.hysteresis import turning_points
-    from .figures.browser_page import Axis, equally_spaced
-
-    driven = "time" in run.observables
-    turns = [] if driven else turning_points(run.fx)
-    chosen = sorted({*equally_spaced(len(run), most), *turns})
-    packings = [packing_in(run, k) for k in chosen]
-    axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
-    ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
-    span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""
-    what = "undamped run" if "undamped" in run.names_of_series else "equilibria"
-    what = "states of a driven run" if driven else what
-    return packings, axis, f"{run.path.name}: {what} of {len(packings[0])} disks{span}"

@@ -1,45 +1,26 @@
-"""A process that ends with its parent, however the parent ends.
+"""A process that ends with its parent, however the parent ends, by PR_SET_PDEATHSIG of the Linux kernel's prctl.
 
-The Linux kernel does this itself (PR_SET_PDEATHSIG of prctl). Other systems, such as macOS, have no such call: a thread
-checks every fifth of a second whether the parent still exists. This has not been tested on macOS.
+Other systems have no such call: there a process outlives a parent that is killed.
 """
 
 import ctypes
 import os
 import signal
 import sys
-import threading
-import time
-
-DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux's prctl."""
-
-SECONDS_BETWEEN_LOOKS = 0.2
-"""Seconds between two looks at the parent, where the kernel does not tell."""
-
-_watching = threading.Event()
 
 
 def end_with(parent: int) -> None:
     """Kill this process as soon as its parent has ended, at once if it has ended already."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DEATH_SIGNAL, signal.SIGKILL)
-        if os.getppid() != parent:
-            os._exit(1)
-    else:
-        _watching.set()
-        threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    _at_parents_death(signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
 
 
 def outlive() -> None:
     """Take `end_with` back."""
+    _at_parents_death(0)
+
+
+def _at_parents_death(number: int) -> None:
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DEATH_SIGNAL, 0)
-    _watching.clear()
-
-
-def _watch(parent: int) -> None:
-    while _watching.is_set():
-        if os.getppid() != parent:
-            os.kill(os.getpid(), signal.SIGKILL)
-        time.sleep(SECONDS_BETWEEN_LOOKS)
+        ctypes.CDLL(None).prctl(1, number)

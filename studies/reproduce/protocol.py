@@ -8,11 +8,12 @@ scene asks for it, a minute perturbation just below the onset follows (:mod:`~fa
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from ...pywrap.scenes.units import dashpot, real_units
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..packing_tools import unit_of_time
-from ..study import Figures, Say, draw_all
+from ..study import Say, draw_all
 from ..triggering import (
     GROWTH_FACTOR,
     Sensitivity,
@@ -51,6 +52,9 @@ from ..triggering import (
     weakened_rate,
 )
 from .triggering_figures import triggering_figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
@@ -69,8 +73,7 @@ COMPARED_TIME = 50.0
 """Length of the run that is compared with linear response, in `unit_of_time`: a few hundred periods of the pair."""
 
 
-@dataclass(frozen=True, eq=False)
-class GrowthRun:
+class GrowthRun(NamedTuple):
     """An undamped run above the onset.
 
     Attributes
@@ -98,8 +101,7 @@ class GrowthRun:
     measured: Growth | None
 
 
-@dataclass(frozen=True, eq=False)
-class Triggered:
+class Triggered(NamedTuple):
     """What is triggered: the runs, of which "strong" has a perturbation `ABOVE_NOISE` as strong, for a shorter time:
     its D stands out of the noise of doubles; the linear response to that, time step included; the growth rate of D
     with the weakened friction where the control starts, from the spectrum, 0 if it is stable; and the response on the
@@ -135,55 +137,44 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     runs = _ramps(scene, output / "run.h5", say)
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")
-    rate = "none" if growth.measured is None else f"{growth.measured.rate:.6g}"
-    say(f"growth rate of D: {rate} measured, {growth.predicted:.6g} predicted")
+    fitted = growth.measured
+    say(f"growth rate of D: {fitted and f'{fitted.rate:.6g}'} measured, {growth.predicted:.6g} predicted")
     summary = summary_of(scene, runs, growth)
     write_json(output / "summary.json", summary)  # what follows may fail
-    draw_all(_figures(runs, growth), output, say)
-    shaken, found, another = triggered or scene, None, None
+    figures: dict[str, Callable[[], Figure]] = {"figure1": partial(draw_packing, growth.start.packing)}
+    figures["figure3"] = partial(draw_pair, [PairCurve.of_onset(run) for run in runs])
+    if fitted is not None:
+        figures["figure4"] = partial(draw_growth, growth.time, growth.msd, growth.predicted, fitted)
+    draw_all(figures, output, say)
+    shaken, another = triggered or scene, None
+    found: Triggered | str = "The scene has no sections [perturb] and [friction], so that nothing is triggered"
     if shaken.perturb is not None and shaken.friction is not None:
         path = output / ("run.h5" if triggered is None else "triggered.h5")
         if triggered is not None:
             say("the packing to be triggered")
             another = _ramps(triggered, path, say)
         found = _trigger(shaken, another or runs, path, say)
-        if isinstance(found, str):
-            say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
-            summary["triggering"] = {"says": found}
-        else:
-            draw_all(triggering_figures(found.found, found.response, found.sensitive), output, say)
-            summary["triggering"] = triggering_summary(found)
+        summary["triggering"] = {"says": found} if isinstance(found, str) else triggering_summary(found)
         if another is not None:
             onsets = [{"mu": run.mu, "onset": run.as_dict()} for run in another]
             summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
+    if isinstance(found, str):
+        say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
     else:
-        say("the scene has no sections [perturb] and [friction]: no figures 2, 5 and 6")
+        draw_all(triggering_figures(found.found), output, say)
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary
 
 
-def _figures(runs: list[Onset], growth: GrowthRun) -> Figures:
-    """The paper's figures 1, 3 and, where D grew far enough to measure its rate, 4."""
-    fitted, curves = growth.measured, [PairCurve.of_onset(run) for run in runs]
-    first: Figures = {"figure1": partial(draw_packing, growth.start.packing), "figure3": partial(draw_pair, curves)}
-    last = (
-        {} if fitted is None else {"figure4": partial(draw_growth, growth.time, growth.msd, growth.predicted, fitted)}
-    )
-    return {**first, **last}
-
-
 def _ramps(scene: Scene, path: Path, say: Say) -> list[Onset]:
     """Ramp and onset for each friction coefficient, the first in the file of that name, the others beside it."""
     # a packing that settles with friction is another one for each coefficient
-    shared = not getattr(scene.packing, "settle_friction", False)
-    if shared:
-        say("settling")
-    bed, runs = settle_bed(scene) if shared else None, []
-    for number, mu in enumerate(scene.law.mus):
-        say(f"mu = {mu:g}: {'' if shared else 'settling, '}ramp and onset")
-        here = path if number == 0 else path.with_stem(f"{path.stem}-mu{mu:g}")
-        runs.append(recorded_ramp(scene, mu, here, bed))
+    bed = None if getattr(scene.packing, "settle_friction", False) else settle_bed(scene)
+    runs = list[Onset]()
+    for mu in scene.law.mus:
+        say(f"mu = {mu:g}: ramp and onset")
+        runs.append(recorded_ramp(scene, mu, path.with_stem(f"{path.stem}-mu{mu:g}") if runs else path, bed))
         say(f"mu = {mu:g}: {runs[-1].describe()}")
     return runs
 
@@ -202,45 +193,42 @@ def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = Non
 
 def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
     """An undamped run where the ramp shows the fastest growth by one pair."""
-    candidates = [each for each in run.equilibria if each.fx > run.fx_c]
-    spectra = [spectrum(each.packing) for each in candidates]
-    best = int(np.argmax([_dominance(each) for each in spectra]))
-    start, modes = candidates[best], spectra[best]
+    candidates = [(each, spectrum(each.packing)) for each in run.equilibria if each.fx > run.fx_c]
+    start, modes = max(candidates, key=lambda each: _dominance(each[1]))
     if not _dominance(modes):
-        first = run.windows[0]
         raise SceneError(
             f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
-            f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
+            f"F_x = {run.fx_c:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
         )
     dt = time_step(start.packing)
     predicted = modes.growth_rate(dt)
-    settings = Perturb(
-        fx=start.fx, time=min(EFOLDS / predicted, MOST_RUN_STEPS * dt), inertia_factor=scene.inertia_factor
-    )
+    time = min(EFOLDS / predicted, MOST_RUN_STEPS * dt)
+    settings = Perturb(fx=start.fx, time=time, inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.smallest_overlap) ** 2
     samples: list[Sample] = []
+    for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):
+        samples.append(sample)
+        if sample.msd > 1e6 * ceiling:
+            break
+    series = series_of(samples)
     with RunFile(path, "a") as file:
-        for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):
-            samples.append(sample)
-            if sample.msd > 1e6 * ceiling:
-                break
-        series = series_of(samples)
         file.append_series("undamped", **series)
-    time, msd = series["time"], series["msd"]
+    times, msd = series["time"], series["msd"]
     try:
-        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, PLATEAU_SHARE * float(msd.max()))))
+        top = min(ceiling, PLATEAU_SHARE * float(msd.max()))
+        measured = fit_growth(times, msd, *growing_range(times, msd, top))
     except ValueError:
         measured = None
-    return GrowthRun(start, time, msd, modes, dt, predicted, measured)
+    return GrowthRun(start, times, msd, modes, dt, predicted, measured)
 
 
 def _dominance(modes: Spectrum) -> float:
     """Growth rate of the fastest pair less the rate of the second pair; 0 of a packing that buckles."""
     if len(modes.negative):
         return 0.0
-    rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
-    return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
+    first, second, *_ = [*sorted((pair.growth_rate for pair in modes.pairs), reverse=True), 0.0, 0.0]
+    return first - second
 
 
 def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered | str:
@@ -248,13 +236,12 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
     say without it; or why there is nothing to trigger. The series go to the file."""
     settings, mu_ss = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction").mu_ss
     run, fx = runs[0], settings.fx
-    if fx is None:
-        try:
-            fx = load_at_onset(scene, {run.mu: run for run in runs})
-        except (SceneError, OnsetError) as error:
-            return str(error)
-        settings = settings.model_copy(update={"fx": fx})
-        scene = scene.model_copy(update={"perturb": settings})
+    try:
+        fx = load_at_onset(scene, {run.mu: run for run in runs}) if fx is None else fx
+    except (SceneError, OnsetError) as error:
+        return str(error)
+    settings = settings.model_copy(update={"fx": fx})
+    scene = scene.model_copy(update={"perturb": settings})
     say(f"triggering at F_x = {fx:g}")
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
@@ -280,19 +267,15 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
     strong = scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": amplitude, "time": time})})
     found.runs["strong"] = series_of(perturb(strong, start, early=EARLY_SAMPLES[0]))
     store("strong", found.runs["strong"])
-    response = linear_response(
-        packing,
-        found.runs["strong"]["time"],
-        force=layer_force(packing, amplitude),
-        omega=settings.omega or 0.0,
-        dt=time_step(packing, settings.time_step),
-    )
+    force, dt = layer_force(packing, amplitude), time_step(packing, settings.time_step)
+    response = linear_response(packing, found.runs["strong"]["time"], force=force, omega=settings.omega or 0.0, dt=dt)
     rate = None if below is None else weakened_rate(below.packing, mu_ss)
     return Triggered(found, response, rate, sensitivity(run))
 
 
 def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, Any]:
     """Numbers for summary.json."""
+    fitted = growth.measured
     return {
         "scene": scene.resolved(),
         "ramps": [
@@ -314,8 +297,8 @@ def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, 
             "fx": growth.start.fx,
             "time_step": growth.time_step,
             "predicted_rate": growth.predicted,
-            "measured": asdict(growth.measured) if growth.measured else None,
-            "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
+            "measured": fitted and asdict(fitted),
+            "deviation": fitted and fitted.rate / growth.predicted - 1,
         },
     }
 
@@ -341,7 +324,7 @@ def triggering_summary(triggered: Triggered) -> dict[str, Any]:
         "weakens_at": outcome.crossing,
         "jump": outcome.jump,
         "growth_in_decades": outcome.growth,
-        "growth_after_the_jump": None if outcome.fitted is None else asdict(outcome.fitted),
+        "growth_after_the_jump": outcome.fitted and asdict(outcome.fitted),
         "forecast": found.foreseen._asdict(),
         "largest_D_of_the_control": largest(runs["control"]) if "control" in runs else None,
         "rate_of_the_control": triggered.control_rate,
@@ -356,45 +339,35 @@ def triggering_summary(triggered: Triggered) -> dict[str, Any]:
 
 
 def report(
-    scene: Scene,
-    runs: list[Onset],
-    growth: GrowthRun,
-    found: Triggered | str | None,
-    another: list[Onset] | None,
+    scene: Scene, runs: list[Onset], growth: GrowthRun, found: Triggered | str, another: list[Onset] | None
 ) -> str:
     """report.md of ramps for each friction coefficient, the run above the onset, and the triggering below it.
 
-    `found` is a sentence where there is nothing to trigger, and None if no scene asks for it; `another` has the ramps
-    of the packing that is triggered, if it is another one.
+    `found` is a sentence where there is nothing to trigger; `another` has the ramps of the packing that is triggered,
+    if it is another one.
     """
     settled, real, units = runs[0].equilibria[0].packing, real_units(scene), scene.units
     earlier = []  # whether an onset comes before that of larger friction; None where their errors do not tell
     for one, other in pairwise(sorted(runs, key=lambda run: run.mu)):
         apart = other.fx_c - one.fx_c
         earlier.append(None if abs(apart) <= one.error + other.error else apart > 0)
-    names: dict[str, Any] = {"real": real, "scene": scene, "dashpot": None}
-    if isinstance(found, Triggered):
+    names: dict[str, Any] = {"triggering": None, "dashpot": None}
+    if not isinstance(found, str):
         numbers = triggering_summary(found)
+        names |= {"triggering": found.found, "numbers": numbers, "sensitive": found.sensitive}
         jump = numbers["jump"]
-        jumped = None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"]))
-        names |= {"numbers": numbers, "sensitive": found.sensitive, "jumped": jumped, "above_noise": ABOVE_NOISE}
+        names["jumped"] = jump and float(np.log10(jump / numbers["largest_D"]["perturbed"]))
     if real is not None and units is not None and units.restitution is not None:
         impact = units.si("impact_velocity") / real.velocity(1.0)
         names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)
     return render(
         __package__ or "",
         "report.md.j2",
-        packing=settled,
+        **{"scene": scene, "packing": settled, "ramp": scene.ramp, "runs": runs, "real": real, "growth": growth},
+        **{"last": runs[0].equilibria[-1], "earlier": earlier, "says": found, "another": another},
         solid_fraction=(solid_fraction(settled), solid_fraction_below_top(settled)),
-        ramp=scene.ramp,
-        runs=runs,
-        last=runs[0].equilibria[-1],
         residual=max(each.residual for run in runs for each in run.equilibria),
-        earlier=earlier,
-        growth=growth,
-        triggering=found.found if isinstance(found, Triggered) else None,
-        says=found,
-        another=another,
+        above_noise=ABOVE_NOISE,
         time_step_share=ACCURATE_SHARE,
         settled_with_friction=getattr(scene.packing, "settle_friction", False),
         **names,

@@ -179,16 +179,10 @@ def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> l
     seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
     time = "how long a scene takes is not known before the first of them: begin, and ask again"
     if seconds:
-        one, each = median(seconds), f"if a scene takes {_span(median(seconds))} as in the {len(seconds)} rows"
-        time = f"about {_span(one * len(scenes))} of one core, {each} that are there"
+        one, hours = median(seconds), median(seconds) * len(scenes) / 3600
+        time = f"about {hours:.2g} h of one core, if a scene takes {one:.2g} s as in the {len(seconds)} rows there"
     refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
     return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
-
-
-def _span(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def require_result(rows: Sequence[Row]) -> None:
@@ -217,12 +211,10 @@ def read_results(*paths: Path) -> dict[str, Row]:
     """
     rows, places = dict[str, Row](), dict[str, Path]()
     for path in paths:
-        for number, row in enumerate(read_keyed_rows(path, "key", "a sweep"), 1):
-            key = row["key"]
-            if not (isinstance(key, str) and {"values", "says", "final", "result"} <= row.keys()):
-                raise SceneError(f"{path}: line {number} is no result of a sweep: take it out, or give another folder")
-            if key in rows and rows[key]["says"] is None:
-                if row["says"] is None and _as_text(row["result"]) != _as_text(rows[key]["result"]):
+        for row in read_keyed_rows(path, ("key", "values", "says", "final", "result"), "a sweep"):
+            key, known = row["key"], rows.get(row["key"])
+            if known is not None and known["says"] is None:
+                if row["says"] is None and _as_text(row["result"]) != _as_text(known["result"]):
                     values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
                     raise SceneError(
                         f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
@@ -233,7 +225,7 @@ def read_results(*paths: Path) -> dict[str, Row]:
     return rows
 
 
-def _as_text(value: dict[str, Any] | None) -> str:
+def _as_text(value: Row | None) -> str:
     """A row, or its result, as text, in which nan equals nan."""
     return json.dumps(value, sort_keys=True)
 
@@ -283,38 +275,24 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
 
 
 def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
-    """The request of the folders of one sweep, whose shards may differ; SceneError if the requests differ."""
-    asked = [_read_request(folder) for folder in folders]
-    first = asked[0]
-    for folder, each in zip(folders, asked, strict=True):
-        if each["version"] != first["version"]:
+    """What sweep.json holds in the folders of one sweep, whose shards may differ; SceneError if the requests differ, or
+    a folder is none of a sweep."""
+    asked = list[dict[str, Any]]()
+    for folder in folders:
+        path = folder / REQUEST_FILE
+        try:
+            request = dict(json.loads(read_plain_text(path)))
+            check_format(request.pop(FORMAT_KEY, None), path)
+            asked.append({name: request[name] for name in ("version", "task", "sweep", "keys", "scene")} | request)
+        except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
             raise SceneError(
-                f"{folder} is of version {each['version']}, and {folders[0]} of {first['version']}: run the same "
-                "sweep there again with one version"
-            )
-        if any(each[name] != first[name] for name in ("task", "sweep", "keys")):
-            raise SceneError(
-                f"{folder} is of another sweep than {folders[0]}, of other scenes or other code: merge parts of one "
-                "sweep, into a new folder or one of this sweep"
-            )
-    return first
-
-
-def _read_request(folder: Path) -> dict[str, Any]:
-    """The contents of sweep.json; SceneError if the folder is none of a sweep."""
-    path = folder / REQUEST_FILE
-    if not path.is_file():
-        raise SceneError(
-            f"{folder} is no folder of a sweep (it has no {REQUEST_FILE}): give folders of `faultgouge sweep`"
-        )
-    try:
-        request = dict(json.loads(read_plain_text(path)))
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise SceneError(f"{path} cannot be read ({error}): give a folder that faultgouge has written") from None
-    check_format(request.pop(FORMAT_KEY, None), path)
-    if not {"task", "sweep", "scene", "version", "keys"} <= request.keys():
-        raise SceneError(
-            f"{folder} is of version 1.0.0 or before, whose rows this version does not know: merge it with the version "
-            "that wrote it, or run the same sweep again"
-        )
-    return request
+                f"{folder} is no folder of a sweep, or of version 1.0.0 or before ({type(error).__name__}: {error}): "
+                "give folders of `faultgouge sweep`"
+            ) from None
+        for name in ("version", "task", "sweep", "keys"):
+            if request[name] != asked[0][name]:
+                raise SceneError(
+                    f"{folder} is of another sweep than {folders[0]}, of other scenes, other code or another version "
+                    f"({name} differs): merge parts of one sweep, into a new folder or one of this sweep"
+                )
+    return asked[0]

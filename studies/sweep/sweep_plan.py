@@ -19,8 +19,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -31,9 +30,7 @@ from typing import Any
 
 from ... import registered
 from ...pywrap import Scene, SceneError
-from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.validation import read_toml
-from ...pywrap.settling.settle import law_of, settling_units
 from .user_function import locate, user_function
 
 MOST_POINTS = 1_000_000
@@ -111,10 +108,7 @@ class Sweep:
     @classmethod
     def of_task(cls, path: Path, task: str) -> Sweep:
         """The sweep of a file that has a sweep of this task, or a scene, which is a sweep of one point."""
-        try:
-            asked = read_toml(path, "sweep").get("task")
-        except SceneError:
-            asked = None  # the reader of scenes says what is wrong
+        asked = read_toml(path, "sweep").get("task")
         if asked is None:
             return cls.from_mapping({"task": task, "scene": Scene.from_toml(path, command=task).resolved()})
         if asked != task:
@@ -127,27 +121,26 @@ class Sweep:
 
         Relative names of files count from `folder`.
         """
-        unknown = sorted(mapping.keys() - {"task", "sweep", "scene"})
-        if unknown:
+        task, axes, scene = mapping.get("task"), mapping.get("sweep", {}), mapping.get("scene", {})
+        if unknown := sorted(mapping.keys() - {"task", "sweep", "scene"}):
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
-        task, code = mapping.get("task"), ""
-        if isinstance(task, str) and ":" in task:
-            code = user_function(locate(task, folder)).code
-        elif task not in registered.tasks():
+        own = isinstance(task, str) and ":" in task
+        if not own and task not in registered.tasks():
             raise SceneError(
                 f"{name}: task = {task!r} is refused: give one of {', '.join(registered.tasks())}, or a function of "
                 'yours as "file.py:function".'
             )
-        axes, scene = mapping.get("sweep", {}), mapping.get("scene", {})
         for section, given in (("sweep", axes), ("scene", scene)):
             if not isinstance(given, Mapping):
                 raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
-        sweep = cls(str(task), {key: _values(key, each, name) for key, each in axes.items()}, dict(scene), code, folder)
-        count = prod(map(len, sweep.axes.values()))
+        values = {key: _values(key, each, name) for key, each in axes.items()}
+        count = prod(map(len, values.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
-        # what is wrong with every scene is refused before any work is done; the first good one is enough to know
-        if all(point.says is not None for point in sweep._each_point()):
+        code = user_function(locate(task, folder)).code if own else ""
+        sweep = cls(str(task), values, dict(scene), code, folder)
+        # what is wrong with every scene is refused before any work is done
+        if all(point.says is not None for point in sweep.points):
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
         return sweep
 
@@ -164,12 +157,9 @@ class Sweep:
     @cached_property
     def points(self) -> tuple[SweepPoint, ...]:
         """Every point, in the order of the table."""
-        return tuple(self._each_point())
-
-    def _each_point(self) -> Iterator[SweepPoint]:
         # a user's function is known by its name and code, without its folder
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
-        known_as = task, version("faultgouge")
+        known_as, points = (task, version("faultgouge")), list[SweepPoint]()
         for number, chosen in enumerate(product(*self.axes.values())):
             values: dict[str, Any] = {}
             for key, value in zip(self.axes, chosen, strict=True):
@@ -179,13 +169,14 @@ class Sweep:
             for name, value in values.items():
                 section, _, key = name.rpartition(".")
                 (mapping.setdefault(section, {}) if section else mapping)[key] = value
+            scene = says = None
             try:
                 scene = Scene.from_mapping(mapping, self.folder, command=self.task)
+                mapping = with_contents(scene)
             except SceneError as error:
                 says = str(error).removeprefix("scene: ")
-                yield SweepPoint(number, values, None, says, digest([*known_as, mapping]))
-            else:
-                yield SweepPoint(number, values, scene, None, digest([*known_as, with_contents(scene)]))
+            points.append(SweepPoint(number, values, scene, says, digest([*known_as, mapping])))
+        return tuple(points)
 
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""
@@ -235,27 +226,23 @@ def _values(key: str, values: Any, name: str) -> list[Any]:
 
 
 def other_packings(sweep: Sweep) -> str | None:
-    """A sentence that names the swept keys by which a seed is another packing at each value; None without any.
+    """A sentence that names the swept keys by which a seed may be another packing at each value; None without any.
 
-    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A seed therefore stands for one
-    packing at one ratio of k_n to F_y alone (in any units, see
-    :func:`~faultgouge.pywrap.settling.settle.settling_units`), and a sweep over load.fy or law.kn compares packings
-    that have only their loose start in common; with `settle_friction`, so does a sweep over friction. Packings that
-    settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored packings have
-    no seed.
+    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A sweep over load.fy or law.kn
+    compares packings that have only their loose start in common; with `settle_friction`, so does a sweep over friction.
+    Packings that settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored
+    packings have no seed.
     """
-    settled = defaultdict(set)
-    keys = [name for name in sweep.names if name.split(".")[0] in ("load", "law", "units")]
-    for point in sweep.points if keys else ():
-        scene = point.scene
-        if scene is not None and isinstance(scene.packing, GeneratedPacking):
-            section, own, fy = settling_units(scene, law_of(scene, scene.law.mus[0]))
-            # without friction nothing of the law but k_n and its exponent has a part in settling
-            numbers = own if scene.packing.settle_friction else (own.kn, own.exponent)
-            settled[digest(section.model_dump())].add(digest([str(numbers), fy]))
-    if not any(len(each) > 1 for each in settled.values()):
+    packing = sweep.scene.get("packing", {})
+    at, frictional = packing.get("settle_at", {}), packing.get("settle_friction", False)
+    settles = {"load.fy": "fy" not in at, "units.overburden": "fy" not in at, "law.kn": "kn" not in at}
+    settles |= {"law.mu": frictional, "law.kt": frictional, "law.exponent": True}
+    others = "kn" not in at  # of [units], k_n follows from them
+    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and others)]
+    if not keys or "file" in packing:
         return None
     return (
-        f"{', '.join(keys)}: settling is chaotic, so that a seed is another packing at each value, and differences "
-        "between values are those of packings, too: compare many seeds, or settle at one load with packing.settle_at"
+        f"{', '.join(keys)}: settling is chaotic, so that a seed may be another packing at each value, and "
+        "differences between values are those of packings, too: compare many seeds, or settle at one load with "
+        "packing.settle_at"
     )

@@ -8,10 +8,10 @@ The function takes a scene and returns one row, a dict of numbers, words, lists 
 With a second parameter the function also receives the packing settled with the scene's first friction coefficient, an
 :class:`~faultgouge.pywrap.Equilibrium`. Scenes that settle to the same packing share it.
 
-A row is identified by the scene and by the code of the function: its file, and the modules in the folder of this file
-that it imports, or that these import. Of "package.module:function" these are the modules of the package. After a change
-of the code, the sweep computes its rows again; comments, docstrings and the layout of a file do not count as code.
-Modules imported by a computed name, and data that a program reads, are not found.
+A row is identified by the scene and by the code of the function: its file, and the modules in the folder of this file,
+or of its package, that it imports, or that these import. After a change of the code, the sweep computes its rows again;
+comments and the layout of a file do not count as code. Modules imported by a computed name, and data that a program
+reads, are not found.
 """
 
 from __future__ import annotations
@@ -24,11 +24,10 @@ import json
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...analysis import FaultgougeError
 from ...analysis.errors import place_in_user_code
@@ -40,19 +39,9 @@ class UserFunctionError(FaultgougeError):
     """A function of the user's fails, or returns no row."""
 
 
-@dataclass(frozen=True)
-class UserFunction:
-    """A function that is named in a sweep.
-
-    Attributes
-    ----------
-    function : callable
-        Takes a scene, and the settled packing if `takes_settled`.
-    takes_settled : bool
-        Whether the function has a second parameter.
-    code : str
-        Sixteen hexadecimal digits: a hash of the code of its file, and of its own modules that the file imports.
-    """
+class UserFunction(NamedTuple):
+    """A function that is named in a sweep; `code` is a hash of its file and of its own modules that the file imports,
+    sixteen hexadecimal digits."""
 
     function: Callable[..., Any]
     takes_settled: bool
@@ -66,17 +55,14 @@ class UserFunction:
         except FaultgougeError:
             raise
         except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
-            raise UserFunctionError(
-                f"{name} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
-            ) from error
-        if not isinstance(row, dict):
-            raise UserFunctionError(f"{name} returned {type(row).__name__}: return a dict of numbers, words and lists")
+            says = f"{name} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
+            raise UserFunctionError(says) from error
         try:
-            plain: dict[str, Any] = json.loads(json.dumps(row, default=lambda value: value.tolist()))
+            plain = json.loads(json.dumps(row, default=lambda value: value.tolist()))
         except (AttributeError, TypeError, ValueError) as error:
-            raise UserFunctionError(
-                f"{name} returned what JSON cannot hold ({error}): give numbers, words, lists"
-            ) from None
+            plain = error
+        if not isinstance(plain, dict):
+            raise UserFunctionError(f"{name} returned {row!r:.60}: return a dict of numbers, words and lists")
         return plain
 
 
@@ -93,8 +79,6 @@ def user_function(name: str) -> UserFunction:
     Raises SceneError if there is no such file, module or function, or it cannot be called with a scene.
     """
     place, _, wanted = name.rpartition(":")
-    if place.endswith(".py") and not Path(place).is_file():
-        raise SceneError(f'task = "{name}": there is no file {place}: correct its path')
     try:
         module = _import_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
     except (Exception, SystemExit) as error:
@@ -136,14 +120,14 @@ def code_digest(module: ModuleType, place: str) -> str:
     code, waiting = dict[str, str](), [file]
     while waiting:
         each = waiting.pop()
-        name = str(each.relative_to(folder))
-        if name in code:
+        if not each.is_file() or (name := str(each.relative_to(folder))) in code:
             continue
         try:
             tree = ast.parse(each.read_bytes())
         except (SyntaxError, ValueError):  # a module that only some call imports, which will say so
             code[name] = each.read_bytes().hex()
             continue
+        code[name] = ast.dump(tree)
         for node in ast.walk(tree):
             at, dotted = folder, list[str]()
             if isinstance(node, ast.Import):
@@ -155,16 +139,5 @@ def code_digest(module: ModuleType, place: str) -> str:
                 if at.is_relative_to(folder) and (at != folder or not package or names[0] == package):
                     # an import of a.b.c runs a, a.b and a.b.c
                     paths = [at.joinpath(*names[: count + 1]) for count in range(len(names))]
-                    files = [found for path in paths for found in (Path(f"{path}.py"), path / "__init__.py")]
-                    waiting += [found for found in files if found.is_file()]
-        code[name] = _without_words(tree)
+                    waiting += [found for path in paths for found in (Path(f"{path}.py"), path / "__init__.py")]
     return hashlib.sha256(repr(sorted(code.items())).encode()).hexdigest()[:16]
-
-
-def _without_words(tree: ast.Module) -> str:
-    """Code without comments, docstrings and layout; changes the tree."""
-    for node in ast.walk(tree):
-        kinds = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-        if isinstance(node, kinds) and ast.get_docstring(node) is not None:
-            node.body[0] = ast.Pass()
-    return ast.dump(tree)

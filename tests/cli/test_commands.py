@@ -112,16 +112,6 @@ def test_settle_finishes_a_settling_and_no_ramp(faultgouge_here, tmp_path, loads
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "says"), [(1, "11 of 40 disks lie above the upper layer"), (2, "")])
-def test_settle_says_that_many_disks_lie_above_the_layer(faultgouge_here, tmp_path, seed, says):
-    packing = {"disks": 40, "width": 7.5, "seed": seed}
-    (tmp_path / "scene.toml").write_text(toml({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}}))
-    said = faultgouge_here("settle", "scene.toml").stderr
-    assert says in said
-    assert ("above the upper layer" in said) is bool(says)
-
-
-@pytest.mark.slow
 def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge_here, tmp_path):
     done = faultgouge_here("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
@@ -155,13 +145,6 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
     assert printed["residual"] < 1.2e-10
 
 
-def test_a_packing_of_another_code_is_converted_before_a_command_reads_it(refusal, tmp_path):
-    (tmp_path / "disks.csv").write_text("x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n")
-    assert f"by `faultgouge import {tmp_path / 'disks.csv'} -o packing.h5`" in refusal(
-        "spectrum", tmp_path / "disks.csv"
-    )
-
-
 @pytest.mark.slow
 def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
     from faultgouge.cli import fail
@@ -174,28 +157,17 @@ def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
     assert "Error: there is not enough memory (Unable to allocate 256. PiB for an array" in capsys.readouterr().err
 
 
-def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
-    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "extremes", "reproduce"]
-    commands += ["import", "export", "movie", "view", "sweep", "modes", "eruptions"]
-    overview = faultgouge("--help").stdout
-    for command in commands:
-        assert command in overview
-        done = faultgouge_here(command, "--help")
-        assert "Example" in done.stdout
-        assert "\\" not in done.stdout  # plain text escapes no brackets
-
-
-def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_here, refusal):
-    from faultgouge.commands import program
-
+def test_every_command_has_help_with_an_example_and_the_overview_its_first_sentence(faultgouge_here, refusal):
     _, table = faultgouge_here("--help").stdout.split("Commands:")
     text = " ".join(table.split())
     assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
     assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
-    commands = program().commands
-    hidden = {name for name in commands if commands[name].hidden}
-    assert hidden == set()
-    assert set(re.findall(r"^  (\w+)  ", table, re.MULTILINE)) == set(commands) - hidden
+    named = set(re.findall(r"^  (\w+)  ", table, re.MULTILINE))
+    assert named >= {"settle", "onset", "spectrum", "explain", "report", "extremes", "reproduce", "import", "modes"}
+    for command in named:
+        shown = faultgouge_here(command, "--help").stdout
+        assert "Example" in shown
+        assert "\\" not in shown  # plain text escapes no brackets
     assert "Did you mean 'onset'?" in refusal("onst")
 
 
@@ -204,26 +176,23 @@ def test_off_a_terminal_progress_is_a_line_a_minute_until_it_is_left(monkeypatch
     """Also within one long item."""
     monkeypatch.setattr(terminal, "SECONDS_BETWEEN_LINES", 0.02)
     for item in terminal.progress([1, 2, 3], "equilibria", 5, done=2):
-        time.sleep(0.5)
+        time.sleep(0.2)
         if item == 2:
             break
     lines = capsys.readouterr().err.splitlines()
     assert set(lines) - {"equilibria: 2 of 5"} == {"equilibria: 3 of 5", "equilibria: 4 of 5"}
-    time.sleep(0.2)
+    time.sleep(0.1)
     assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(
     ("command", "change", "code", "says"),
     [
-        ("perturb", ("kn = 2e5", "kn = -1.0"), 2, "law.kn = -1.0 is refused: give a number above 0"),
+        ("perturb", ("kn = 2e5", "kn = -1.0"), 2, "law.kn = -1.0 is refused: it should be greater than 0"),
         ("perturb", ("fy = 3.0", "fy = 300.0"), 2, "the packing is not in balance, a disk feels"),
         ("perturb", ("time = 0.5", "time = 0.5\ntime_step = 0.1"), 2, "over the limit 2/omega_max"),
-        ("perturb", ("time = 0.5", "time = 1e-9"), 2, "shorter than one step"),
         ("onset", ("", ""), 1, "No pair of eigenvalues is complex up to F_x = 0.004"),
-        ("onset", ("[ramp]", "[damping]\ncn = 1.0\n[ramp]"), 1, "No motion grows up to F_x = 0.004"),
         ("onset", ("[ramp]", "[damping]\n[ramp]"), 2, "damping"),
-        ("onset --modes 0:10", ("[ramp]", "[damping]\nct = 1.0\n[ramp]"), 2, "--modes goes without [damping]"),
     ],
 )
 @pytest.mark.slow

@@ -86,16 +86,6 @@ def test_closed_streams(tmp_path, closed):
     assert read_configuration(tmp_path / "pile.h5").residual < 1e-6
 
 
-def test_deleted_folder(tmp_path):
-    """Of the shell in which the command is called."""
-    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
-    (tmp_path / "gone").mkdir()
-    words = f"cd gone && rmdir ../gone && {BIN}/faultgouge import {tmp_path}/pile.in"
-    done = subprocess.run(words, shell=True, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr == ("Error: the folder in which this command was called has been deleted: go to another one\n")
-
-
 def test_names_that_the_locale_cannot_decode(tmp_path):
     (tmp_path / "häufchen.in").write_text(DECK.format(**FLAT, word="contacts"))
     words = [BIN / "faultgouge", "import", "häufchen.in", "-o", "häufchen.h5"]

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pile_decks import DECK, ROUND
-from reference_layer import BIN
 
 HEAD = DECK.format(**ROUND, word="contacts").rpartition("run 6000")[0]
 
@@ -92,10 +91,9 @@ def _last_frame(text, count):
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory):
+def folders(tmp_path_factory, lmp_of_the_environment):
     """For each deck, the folders that `lmp -in` and this program leave, and what this program has found."""
-    base = tmp_path_factory.mktemp("decks")
-    here = {}
+    base, here, (program, environment) = tmp_path_factory.mktemp("decks"), {}, lmp_of_the_environment
     for name, files in DECKS.items():
         for who in ("lmp", "here"):
             folder = base / name.replace(" ", "_") / who
@@ -103,9 +101,8 @@ def folders(tmp_path_factory):
                 (folder / file).parent.mkdir(parents=True, exist_ok=True)
                 (folder / file).write_text(fill)
             if who == "lmp":
-                subprocess.run(
-                    [BIN / "lmp", "-in", "deck.in"], cwd=folder, capture_output=True, check=False, timeout=60
-                )
+                command = [program, "-in", "deck.in"]
+                subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False, timeout=60)
         here[name] = folder
     decks = [str(folder / "deck.in") for folder in here.values()]
     done = subprocess.run(

@@ -268,17 +268,15 @@ def test_a_state_that_moves_is_kept(faultgouge, faultgouge_here, tmp_path, name)
     assert np.abs(on.contacts.tangential_force - tangential).max() < 1e-3 * np.abs(tangential).max()
 
 
-def test_bare_files_of_lammps(faultgouge_here, tmp_path):
-    """A restart or data file without contacts and laws: the lines of a deck around it."""
+def test_bare_files_of_lammps(refusal, faultgouge_here, tmp_path):
+    """A restart or data file without contacts and laws: a deck around it has these."""
     ends = "run 10\nwrite_restart pile.restart\nwrite_data pile.data\n"
     (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="").replace("run 6000", ends))
     faultgouge_here("import", "pile.in", "--balance", "1e9", "-o", "pile.h5")
-    for file, reads in (("pile.restart", "read_restart pile.restart"), ("pile.data", "units lj\natom_style sphere\n")):
-        said = faultgouge_here("import", file, code=None).stderr
-        lines = said.partition("give `faultgouge import pile.in`:\n\n")[2]
-        assert reads in lines
-        (tmp_path / "around.in").write_text(f"{lines}\n")
-        assert "3 spheres, " in faultgouge_here("import", "around.in", "--balance", "1e9", "-o", f"{file}.h5").stdout
+    for kind in ("restart", "data"):
+        assert f"write a deck with {'read_' + kind if kind == 'restart' else 'units lj'}" in refusal(
+            "import", f"pile.{kind}"
+        )
 
 
 def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
@@ -291,7 +289,7 @@ def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
         for mode in ("pair", "0"):
             says = faultgouge_here(command, "far.h5", "--mode", mode, *output, code=None).stderr
             assert "the packing has 0 modes" in says
-    assert "no frame 3: leave --frame out" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
+    assert "no frame 3" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
 
 
 def two_on_three():

@@ -1,27 +1,9 @@
 """The command onset: what it prints and writes of one friction coefficient or several, and what it refuses."""
 
 import json
-from functools import partial
-from types import SimpleNamespace
 
 import pytest
 from reference_layer import LAYER, SMALL, toml
-
-from faultgouge.analysis import (
-    NoEquilibriumError,
-)
-from faultgouge.pywrap.lammps.instance import lammps_instance
-from faultgouge.pywrap.settling.settle import settle_bed
-
-
-@pytest.mark.slow
-def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
-    (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 1e-3, "until": 0.022}}))
-    for more, modes in (((), None), (("--modes", "0:285"), [0, 285])):
-        result = json.loads(faultgouge_here("onset", "scene.toml", *more, "--json").stdout)
-        assert result.get("modes") == modes
-        assert result["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
-        assert result["windows"][0].keys() >= {"fx_onset", "fx_end", "lambda", "error"}
 
 
 @pytest.mark.slow
@@ -35,12 +17,13 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
     law = 'law of friction: the paper\'s smoothed law (history = "total")'
     assert first.stdout.splitlines()[-1] == law
     assert first.stderr == ""
-    every = faultgouge_here("onset", "scene.toml", "--all", "--json")
-    windows, table = json.loads(every.stdout)["windows"], every.stderr.splitlines()  # JSON is what the user asked for
+    table = faultgouge_here("onset", "scene.toml", "--all", "-o", "onset.json").stdout.splitlines()
+    windows = json.loads((tmp_path / "onset.json").read_text())["windows"]
     assert [line.split()[:2] for line in table[:2]] == [["mu", "="], ["from", "F_x"]]
     assert len(table) == 2 + len(windows) + 1
     assert table[-1] == law
     assert table[0] == first.stdout.splitlines()[0]
+    assert windows[0]["fx_onset"] == pytest.approx(0.0218330564080, rel=1e-9)
     assert windows == sorted(windows, key=lambda window: window["fx_onset"])
     for command, result in (("settle", "100 disks"), ("ramp", "F_x = 0.022 reached"), ("perturb", "F_x = 0.022, mu")):
         done = faultgouge_here(command, "scene.toml", "-o", f"{command}.h5")
@@ -48,54 +31,15 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
         assert result not in done.stderr
 
 
-@pytest.mark.slow
-def test_a_bed_is_settled_once_for_all_friction_coefficients(faultgouge_here, tmp_path, monkeypatch):
-    """And the dumps of a ramp are written by the LAMMPS that has the packing, and by no other."""
-    settled, opened = [], []
-    for name, calls, what in (
-        ("faultgouge.pywrap.settling.settle.settle_bed", settled, settle_bed),
-        ("faultgouge.studies.reproduce.protocol.settle_bed", settled, settle_bed),
-        ("faultgouge.pywrap.lammps.engine.lammps_instance", opened, lammps_instance),
-    ):
-        monkeypatch.setattr(
-            name, partial(lambda calls, what, *given, **more: calls.append(1) or what(*given, **more), calls, what)
-        )
-    small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}}
-    (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": [1.0, 0.8, 0.5]}}))
-    assert len(faultgouge_here("onset", "scene.toml").stdout.splitlines()) == 7  # the last one names the law
-    assert len(settled) == 1
-    settled.clear()
-    monkeypatch.setattr("faultgouge.studies.reproduce.protocol.recorded_ramp", ramps_that_end(beds := []))
-    faultgouge_here("reproduce", "scene.toml", "-o", "out", code=1)
-    assert len(settled) == 1
-    assert len(beds) == 3
-    assert all(bed is beds[0] is not None for bed in beds)
-    counts = []
-    for dumps in (False, True):
-        opened.clear()
-        (tmp_path / "scene.toml").write_text(toml(small | {"output": {"dumps": dumps}}))
-        faultgouge_here("ramp", "scene.toml", "-o", f"{dumps}.h5")
-        counts.append(len(opened))
-    assert counts[0] == counts[1]
-    assert len(list(tmp_path.glob("True.*.disks"))) == 5
-
-
-@pytest.mark.parametrize(
-    ("disks", "more", "says", "damping"),
-    [
-        (301, (), "--all finds all windows of up to 300 disks, and the packing has 301: leave --all out", {}),
-        (301, (), "--all finds all windows of up to 300 disks, and", {"damping": {"cn": 1.0}}),
-        (30, ("--modes", "0:20"), "--all goes without --modes", {}),
-    ],
-)
-def test_all_windows_are_refused_where_the_first_alone_would_come(
-    faultgouge_here, tmp_path, disks, more, says, damping
-):
+@pytest.mark.parametrize("damping", [{}, {"damping": {"cn": 1.0}}])
+def test_all_windows_are_refused_where_the_first_alone_would_come(faultgouge_here, tmp_path, damping):
     """Before any work: no file, and no packing that settles."""
-    scene = SMALL | {"packing": {"disks": disks, "width": 8.0}} | damping
+    scene = SMALL | {"packing": {"disks": 301, "width": 8.0}} | damping
     (tmp_path / "scene.toml").write_text(toml(scene))
-    done = faultgouge_here("onset", "scene.toml", "--all", *more, "-o", "onset.json", code=2)
-    assert done.stderr.startswith(f"Error: {says}")  # not after what the work would take
+    done = faultgouge_here("onset", "scene.toml", "--all", "-o", "onset.json", code=2)
+    assert done.stderr.startswith(
+        "Error: --all finds all windows of up to 300 disks, and the packing has 301: leave --all out"
+    )  # not after what the work would take
     assert not (tmp_path / "onset.json").exists()
 
 
@@ -119,18 +63,6 @@ def test_onset_names_the_friction_coefficients_without_one(faultgouge_here, tmp_
     assert [line.split(":")[0] for line in done.stdout.splitlines()] == ["mu = 1", "mu = 0.8"]
 
 
-def ramps_that_end(beds):
-    """A ramp of which no more is asked than the bed that it is given; the third one ends the command."""
-
-    def ramp(scene, mu, path, bed):
-        beds.append(bed)
-        if len(beds) == 3:
-            raise NoEquilibriumError("enough")
-        return SimpleNamespace(describe=lambda: "none")
-
-    return ramp
-
-
 def test_the_undamped_onset_of_a_ramp_on_which_the_dissipation_stops_all_growth(faultgouge_here, tmp_path):
     small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 7e-3, "until": 0.014}}
     (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": 0.3}, "damping": {"cn": 500.0}}))
@@ -140,7 +72,6 @@ def test_the_undamped_onset_of_a_ramp_on_which_the_dissipation_stops_all_growth(
     assert (result["fx_c"], result["windows"]) == (None, [])
     assert result["undamped"]["fx_c"] == pytest.approx(0.01394557, abs=1e-7)
     assert result["undamped"]["error"] > 0
-    assert "mu = 0.3: without dissipation F_x^c = 0.01394" in done.stderr
     assert "Error: No motion grows up to F_x = 0.014: raise ramp.until." in done.stderr
 
 
@@ -151,7 +82,6 @@ def test_onset_with_dissipation_as_json(faultgouge_here, tmp_path):
     done = faultgouge_here("onset", "scene.toml", "-o", "onset.json", "--json")
     result = json.loads(done.stdout)
     assert json.loads((tmp_path / "onset.json").read_text()) == result
-    assert "searched_to" not in result
     assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
     assert result["undamped"]["fx_c"] == pytest.approx(0.0218330564080, rel=1e-9)
     window = result["windows"][0]

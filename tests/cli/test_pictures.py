@@ -7,7 +7,7 @@ import sys
 
 import pytest
 from PIL import Image
-from reference_layer import BIN, toml
+from reference_layer import toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
@@ -72,14 +72,17 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     assert "1 slip up to t = " in again.stdout
     drawn = faultgouge_here("draw", "drive.h5", "-o", "force.png")
     assert drawn.stdout == "written to force.png\n"
-    by_time = faultgouge_here("draw", "drive.h5", "--time", str(slip["begins"]), "-o", "packing.png").stdout
-    by_frame = faultgouge_here("draw", "drive.h5", "--frame", slip["frame_before"], "-o", "packing.png").stdout
+    before = slip["frame_before"]
+    by_time, by_frame = (
+        faultgouge_here("draw", "drive.h5", *which, "-o", "packing.png").stdout
+        for which in (("--time", str(slip["begins"])), ("--frame", before))
+    )
     assert by_time == by_frame
     film = ("movie", "drive.h5", "--span", "1", "9", "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
     faultgouge_here(*film)
     with Image.open(tmp_path / "film.gif") as gif:
         assert gif.n_frames == 5
-    assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", slip["frame_before"]).stdout
+    assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", before).stdout
     backwards = faultgouge_here("movie", "drive.h5", "--span", "9", "1", "-o", "film.gif", code=2).stderr
     assert f"has 0 of its {len(times)} states between t = 9 and 1" in backwards
     assert "is the table of the slips" in faultgouge_here("drive", "scene.toml", "-o", "slips.csv", code=1).stderr
@@ -100,10 +103,11 @@ def test_init_writes_a_scene_that_holds_every_key(faultgouge_here, tmp_path):
         assert not missing, f"{name}: {missing}"
 
 
-def test_version_in_both_ways():
-    for command in ([BIN / "faultgouge"], [sys.executable, "-m", "faultgouge"]):
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=100)
-        assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
+def test_version():
+    done = subprocess.run(
+        [sys.executable, "-m", "faultgouge", "--version"], capture_output=True, text=True, timeout=100
+    )
+    assert re.fullmatch(r"faultgouge \S+ \(LAMMPS \S+\)\n", done.stdout), done.stderr
 
 
 @pytest.mark.slow

@@ -59,4 +59,4 @@ def test_a_deck_is_run_and_judged(faultgouge_here, tmp_path):
 def test_without_a_file_it_is_the_old_name_of_extremes(faultgouge_here, tmp_path):
     done = faultgouge_here("stability", "-o", "cases", "--quick")
     assert "is called faultgouge extremes now" in done.stderr
-    assert (tmp_path / "cases" / "stability.json").read_bytes() == (tmp_path / "cases" / "extremes.json").read_bytes()
+    assert json.loads((tmp_path / "cases" / "extremes.json").read_text())["cases"]

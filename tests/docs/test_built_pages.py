@@ -3,9 +3,7 @@
 `make docs` runs these tests at its end. Without built pages they are skipped: building takes minutes.
 """
 
-import json
 import re
-import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -77,83 +75,3 @@ def test_no_link_between_pages_is_dead(pages):
             if not target.exists() or (parts.fragment and target in pages and unquote(parts.fragment) not in places):
                 dead.append(f"{path.relative_to(PAGES)}: {link}")
     assert dead == []
-
-
-@pytest.mark.parametrize("word", ["window", "wsl", "mac", "libmpi", "seed", "colab", "instal"])
-def test_the_search_finds(word):
-    """Sphinx searches by the stems of words."""
-    index = (PAGES / "searchindex.js").read_text()
-    index = json.loads(index[index.index("{") : index.rindex("}") + 1])
-    numbers = set()
-    for terms in (index["terms"], index["titleterms"]):
-        found = terms.get(word, [])
-        numbers |= set(found if isinstance(found, list) else [found])
-    names = {index["docnames"][k] for k in numbers}
-    assert names & {"install", "lesson", "scenes"}, names
-
-
-@pytest.fixture
-def new_page():
-    """Opens an empty page of a browser; at the end nothing went wrong in the browser."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium is installed")
-    wrong = []
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
-
-        def open_page(width, height):
-            page = browser.new_page(viewport={"width": width, "height": height})
-            page.on("pageerror", lambda error: wrong.append(f"{page.url}: {error}"))
-            page.on("console", lambda each: wrong.append(f"{page.url}: {each.text}") if each.type == "error" else None)
-            return page
-
-        yield open_page
-        browser.close()
-    assert wrong == []
-
-
-@pytest.fixture
-def front_page(new_page):
-    """Opens the front page with its demonstration."""
-
-    def open_page(width, height):
-        page = new_page(width, height)
-        page.goto((PAGES / "index.html").as_uri())
-        page.frame_locator(".live iframe").locator("#imaginary circle").first.wait_for(timeout=60_000)
-        return page
-
-    return open_page
-
-
-@pytest.mark.parametrize("width", [1280, 390])
-def test_no_page_is_wider_than_the_screen(new_page, pages, width):
-    """A formula that is not recognised as one is."""
-    page, wide = new_page(width, 900), []
-    for path in sorted(pages):
-        if path.is_relative_to(PAGES / "_modules"):
-            continue
-        page.goto(path.as_uri())
-        if page.evaluate("document.documentElement.scrollWidth") > width:
-            wide.append(str(path.relative_to(PAGES)))
-    assert wide == []
-
-
-def test_the_front_page_shows_the_demonstration_at_once(front_page):
-    """On a screen of 1280 x 900 the packing, the slider and the plots of eigenvalues are seen without scrolling."""
-    page = front_page(1280, 900)
-    frame, live = page.locator(".live iframe").bounding_box(), page.frame_locator(".live iframe")
-    plots = [live.locator(f"text={title} parts of the chosen pair").bounding_box() for title in ("Real", "Imaginary")]
-    assert frame["y"] + frame["height"] <= 900
-    assert all(box["y"] + 150 < 900 for box in plots)
-
-
-def test_the_front_page_fits_a_telephone(front_page):
-    page = front_page(390, 844)
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
-    live = page.frame_locator(".live iframe")
-    for part in ("#verdict", "#play", "#growth"):
-        box = live.locator(part).bounding_box()
-        assert box["y"] + box["height"] <= 844
-        assert box["x"] + box["width"] <= 390

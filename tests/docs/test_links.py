@@ -80,24 +80,6 @@ def test_explanations_are_two_screens_with_a_picture_before_any_number():
         assert re.findall(r"\d\.\d|10\^|\b\d\d+", text[: text.index("![")]) == [], page
 
 
-def test_the_page_on_complex_pairs_names_what_there_is():
-    text = (ROOT / "docs" / "complex_pairs.md").read_text()
-    named = re.findall(r"`([\w/]+\.py)`:\s((?:`[\w.]+`(?:, )?)+)", text)
-    assert len(named) >= 6
-    for name, places in named:
-        source = (ROOT / "analysis" / "windows" / name).read_text()
-        for place in re.findall(r"[\w.]+", places):
-            assert all(re.search(rf"^ *(class|def) {part}\b", source, re.MULTILINE) for part in place.split(".")), place
-
-
-def test_a_wrong_page_is_found_out(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("```console\n$ echo mu = 1.01\nmu = 1.0\n$ echo mu = 1.0001\nmu = 1.0\n$ false\n```\n")
-    number, code = run(page, tmp_path)
-    assert "1.01" in number
-    assert "exit code 1" in code
-
-
 def with_blocks(language):
     """Pages with blocks of a language; two ranks that share their cores with others take ten times as long."""
     for path in PROSE:
@@ -192,50 +174,38 @@ def test_no_output_is_stored():
     assert [cell for cell in cells if cell.get("outputs") or cell.get("execution_count")] == []
 
 
-def printed_and_shown(name):
-    """What a notebook prints, and how many pictures it shows: a cell that ends with a figure shows it."""
+def number(text, before):
+    return float(re.search(re.escape(before) + r" (\d[-+.\de]*)", text)[1])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "pictures", "layer"), [("exceptional_point", 7, "a hundred disks"), ("own_packing", 3, "own packing")]
+)
+def test_notebooks_run_and_find_the_onset_of_the_command(faultgouge, tmp_path, name, pictures, layer):
+    """A cell that ends with a figure shows it. Paths with other increments find the same onset, within its error."""
     nbformat, nbclient = map(pytest.importorskip, ("nbformat", "nbclient"))
     pytest.importorskip("ipykernel")
     notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", 4)
     nbclient.NotebookClient(notebook, timeout=300).execute()
     outputs = [each for cell in notebook.cells for each in cell.get("outputs", [])]
     text = "".join(each["text"] for each in outputs if each.output_type == "stream" and each.name == "stdout")
-    return text, sum("image/png" in each.get("data", {}) for each in outputs)
-
-
-def number(text, before):
-    return float(re.search(re.escape(before) + r" (\d[-+.\de]*)", text)[1])
-
-
-@pytest.mark.long
-def test_the_exceptional_point(faultgouge, tmp_path):
-    """The pair of three disks opens as a square root; the hundred disks have the onset of the command."""
-    text, pictures = printed_and_shown("exceptional_point")
-    assert pictures == 7
-    assert number(text, "the layer slips by") > 0.01
-    # beside the root stands a term that is proportional to the distance: a hundredth of the load at the most
-    assert number(text, "exponent") == pytest.approx(0.5, abs=0.01)
-    sections = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-3, "until": 0.02}}
-    (tmp_path / "scene.toml").write_text(toml(sections))
+    assert sum("image/png" in each.get("data", {}) for each in outputs) == pictures
+    if name == "own_packing":
+        page = (ROOT / "docs" / "howto_own_packing.md").read_text()
+        deck, scene = re.findall(r"```\n(.*?)```", page, re.DOTALL)
+        (tmp_path / "pour.in").write_text(deck)
+        subprocess.run([BIN / "lmp", "-in", "pour.in"], cwd=tmp_path, capture_output=True, check=True)
+        [relaxing] = re.findall(r"^    faultgouge (import .*)$", page, re.MULTILINE)
+        faultgouge(*relaxing.split())
+    else:
+        # beside the root stands a term that is proportional to the distance: a hundredth of the load at the most
+        assert number(text, "exponent") == pytest.approx(0.5, abs=0.01)
+        seed = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+        scene = toml(seed | {"ramp": {"step": 1e-3, "until": 0.02}})
+    (tmp_path / "scene.toml").write_text(scene)
     found = json.loads(faultgouge("onset", "scene.toml", "--json").stdout)
-    # other equilibria between the same loads, printed with ten digits; the command states the error
-    assert number(text, "a hundred disks: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
-
-
-@pytest.mark.long
-def test_a_packing_of_ones_own(faultgouge, tmp_path):
-    """The commands of the how-to find the same onset: their path has other increments, whose error they state."""
-    page = (ROOT / "docs" / "howto_own_packing.md").read_text()
-    deck, scene = re.findall(r"```\n(.*?)```", page, re.DOTALL)
-    (tmp_path / "pour.in").write_text(deck)
-    (tmp_path / "own.toml").write_text(scene)
-    subprocess.run([BIN / "lmp", "-in", "pour.in"], cwd=tmp_path, capture_output=True, check=True)
-    [relaxing] = re.findall(r"^    faultgouge (import .*)$", page, re.MULTILINE)
-    faultgouge(*relaxing.split())
-    found = json.loads(faultgouge("onset", "own.toml", "--json").stdout)
-    text, pictures = printed_and_shown("own_packing")
-    assert pictures == 3
-    assert number(text, "own packing: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
+    assert number(text, f"{layer}: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
 
 
 @pytest.mark.parametrize(

@@ -95,9 +95,8 @@ def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
     ("at", "says"),
     [
         ({}, "packing.settle_at has nothing in it: give fy, or kn, or both"),
-        ({"fy": -1.0}, "packing.settle_at.fy = -1.0 is refused: give a number above 0"),
+        ({"fy": -1.0}, "packing.settle_at.fy = -1.0 is refused: it should be greater than 0"),
         ({"fx": 1.0}, "fx is no key"),
-        ({"fy": 1e9}, "packing.settle_at does not settle, since load.fy = 1e\\+09 presses two disks"),
     ],
 )
 def test_a_load_of_settling_that_is_none_is_refused(at, says):

@@ -93,7 +93,7 @@ FORCED = {
     "cosine": COSINE,
     "cosine, compensated": COSINE,
     "cosine, damped": COSINE,
-    "sweep, compensated": {"signal": "sweep", "amplitude": 1e-6, "omega": 3.0, "omega_end": 9.0},
+    "pulse, compensated": {"signal": "pulse", "amplitude": 1e-6, "omega": 20.0},
     "moving floor": {"signal": "pulse", "on": "floor", "amplitude": 1e-6, "omega": 20.0},
 }
 

@@ -13,7 +13,7 @@ from table_rows import rows_of
 from faultgouge import registered
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.scenes.command_sections import COMMANDS, command_of
-from faultgouge.pywrap.scenes.scene import Scene, SceneError, refuse_endless
+from faultgouge.pywrap.scenes.scene import Scene, SceneError
 
 SHIPPED = str(DECKS / "packing100.data")
 
@@ -22,29 +22,14 @@ ROOT = Path(__file__).parents[2]
 LEAST = {"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 FULL = {
     "precision": "double",
-    "packing": {
-        "disks": 40,
-        "radii": [0.4, 0.5, 0.6],
-        "top": 5,
-        "width": 8,
-        "seed": 3,
-        "periodic": True,
-        "settle_friction": True,
-        "masses": "spheres",
-    },
+    "packing": {"disks": 40, "radii": [0.4, 0.5, 0.6], "top": 5, "width": 8, "seed": 3, "periodic": True}
+    | {"settle_friction": True, "masses": "spheres"},
     "law": {"kn": 1e5, "kt": 0.5, "mu": [1, 0.8], "exponent": 1, "history": "total"},
     "load": {"fy": 2},
     "relax": {"damping": 3.0, "time_step": 0.01},
     "ramp": {"step": 1e-3, "until": 0.02, "method": "overdamped", "force_tolerance": 1e-12},
-    "perturb": {
-        "fx": 0.01,
-        "time": 1e3,
-        "amplitude": 1e-12,
-        "omega": 0.01,
-        "target": [3, 4],
-        "time_step": 1e-3,
-        "inertia_factor": 0.5,
-    },
+    "perturb": {"fx": 0.01, "time": 1e3, "amplitude": 1e-12, "omega": 0.01, "target": [3, 4], "time_step": 1e-3}
+    | {"inertia_factor": 0.5},
     "friction": {"B": 0.1, "w": 1, "mu_ss": 0.9, "v0": 2e-11, "v_ss": "100 v0"},
     "output": {"trajectory": True, "dumps": True},
 }
@@ -134,16 +119,11 @@ def test_what_cannot_be_run_is_refused_in_one_sentence(refused_scene, changes, s
     assert says in refused_scene(merge_changes(changes))
 
 
-def test_a_list_is_no_scene(refused_scene):
-    assert "this one is no mapping: give a dict" in refused_scene([])
-
-
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
         ("missing.json", None, "cannot be read at"),
         ("broken.json", b"{", "is not read as packing.json"),
-        ("other.json", b'{"x": [1]}', "lacks .y."),
         ("run.h5", b"no HDF5", "is of no format that is read: give"),
         ("deep.json", b"[" * 100_000, ""),
         ("long.json", b'{"x": [' + b"9" * 400 + b'], "y": [1.0], "radius": [0.5]}', ""),
@@ -155,11 +135,6 @@ def test_a_packing_file_is_looked_at_before_any_work(refused_scene, tmp_path, na
         (tmp_path / name).write_bytes(content)
     sentence = refused_scene(merge_changes({"packing": {"file": name}}), tmp_path)
     assert re.search(rf'scene: packing.file = ".*{name}" .*{says}', sentence)
-
-
-def test_a_loop_of_links_is_refused(refused_scene, tmp_path):
-    (tmp_path / "a.json").symlink_to("a.json")
-    assert "a.json" in refused_scene(merge_changes({"packing": {"file": "a.json"}}), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -189,29 +164,12 @@ SHORT = {
 }
 
 
-def with_key(section, key, value):
-    return SHORT | {section: SHORT[section] | {key: value}}
-
-
 @pytest.mark.parametrize(
     ("key", "value"), [("time", 2.0**63), ("time_step", 1e-30), ("inertia_factor", 1e-50), ("time", 1e13)]
 )
-def test_runs_without_end_are_refused(key, value):
-    scene = Scene.from_mapping(with_key("perturb", key, value))
-    with pytest.raises(SceneError, match=r"the scene asks perturb for .* time steps, a year and more: lower perturb"):
-        refuse_endless(scene, "perturb")
-    refuse_endless(scene, "settle")
-
-
-def test_what_no_machine_holds_is_refused(monkeypatch):
-    packing = {"disks": 10**6, "top": 10**4, "width": 1.2e3, "seed": 3}
-    scene = Scene.from_mapping(SHORT | {"packing": packing, "ramp": {"step": 2e-9, "until": 0.01}})
-    refuse_endless(scene, "onset")
-    with pytest.raises(SceneError, match=r"the scene asks ramp for a file of 7.5e.02 TB: take a larger ramp.step"):
-        refuse_endless(scene, "ramp")
-    monkeypatch.setattr("os.sysconf", lambda name: 1024)
-    with pytest.raises(SceneError, match=r"the scene asks onset for 4 GB of memory, and this machine has 0.001: take"):
-        refuse_endless(scene, "onset")
+def test_runs_without_end_are_refused(refused_scene, key, value):
+    says = refused_scene(SHORT | {"perturb": SHORT["perturb"] | {key: value}})
+    assert re.search(r"perturb.time = .* takes .* time steps, a year and more: lower it", says)
 
 
 WRONG = {

@@ -77,15 +77,17 @@ def test_two_columns_and_records_are_read(tmp_path):
         (None, {}, "cannot be read (No such file or directory)"),
         ("0 1\n1 nan\n", {}, "line 2: 'nan' is no number"),
         ("0 1 2\n1 2 3\n", {}, "line 1: it has 3 columns, and two are needed"),
-        ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude cannot stand beside a signal from a file"),
+        ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude does not belong to a signal from a file"),
         ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),
         ("0 1\n1 1\n", {"channel": "EHZ"}, "has no channels"),
         (None, {"signal": "pulse", "amplitude": 1.0}, "perturb.omega is missing"),
-        (None, {"signal": "sweep", "amplitude": 1.0, "omega": 1.0}, "perturb.omega_end is missing"),
         (None, {"signal": "pulse", "omega": 1.0}, "perturb.amplitude is missing"),
-        (None, {"signal": None, "on": "floor", "amplitude": 1.0, "omega": 1.0}, "perturb.on stands without signal"),
-        (None, {"signal": None, "scale": 2.0}, "perturb.scale belongs to a signal from a file"),
-        (None, {"signal": None, "omega_end": 2.0}, 'perturb.omega_end belongs to signal = "sweep"'),
+        (
+            None,
+            {"signal": None, "on": "floor", "amplitude": 1.0, "omega": 1.0},
+            "perturb.on does not belong to a section without signal",
+        ),
+        (None, {"signal": None, "scale": 2.0}, "perturb.scale does not belong to a section without signal"),
     ],
 )
 def test_scenes_with_a_bad_signal_are_refused(refused_scene, tmp_path, text, keys, says):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faultgouge.studies.statistics import share
-from research.statistics import count_of, median_over_runs, share_over_runs
+from research.statistics import count_of, median_interval, median_over_runs, share_over_runs
 
 
 def test_a_share_of_runs_that_differ_is_less_certain_than_one_of_single_values():
@@ -30,3 +30,15 @@ def test_the_interval_of_runs_covers_the_truth_where_that_of_values_does_not():
     assert np.mean(covers) > 0.8
     assert median_over_runs([[1.0]]) is None
     assert median_over_runs([[1.0, 2.0], [], [3.0]])[0] == pytest.approx(2.0)
+
+
+def test_interval_of_a_median_covers_it_as_often_as_it_says():
+    generator = np.random.default_rng(1)
+    covered = 0
+    for trial in range(200):
+        sample = generator.exponential(size=40)
+        median, low, high = median_interval(np.minimum(sample, 2.0), sample < 2.0, draws=200, seed=trial)
+        assert low <= median <= high
+        covered += low <= np.log(2) <= high
+    # 190 of 200 are expected, and 180 is three standard deviations below
+    assert covered >= 180

@@ -5,33 +5,27 @@ import json
 
 import numpy as np
 import pytest
+from reference_layer import SMALL
 from scipy.linalg import expm
 
 from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
-from faultgouge.pywrap import Equilibrium, Scene
+from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
 from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, with_spring
 
-SPRING = 10.0
+SPRING, PACKING = 10.0, {"disks": 40, "seed": 2}
 
 
 def make_run(path, **drive):
     """The file of a driven run of forty disks."""
     scene = Scene.from_mapping(
-        {
-            "packing": {"disks": 40, "seed": 2},
-            "law": {"kn": 2e5, "mu": 1.0},
-            "load": {"fy": 3.0},
-            "damping": {"cn": 60.0, "ct": 17.0},
-            "drive": {"spring": SPRING} | drive,
-        }
+        SMALL | {"damping": {"cn": 60.0, "ct": 17.0}, "drive": {"spring": SPRING} | drive, "packing": PACKING}
     )
     with DriveRecord(path, scene) as record:
         record.append(Equilibrium.of(settle_for_drive(scene)))
-        for _ in record.drive():
-            pass
+        list(record.drive())
         record.finish()
     return path
 
@@ -85,28 +79,27 @@ def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
     assert read_configuration(tmp_path / "run.h5") == configuration != with_spring(configuration, 0.0)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
     def states(folder, **options):
         cycle(slow, folder, **options)
         return json.loads((folder / "cycle.json").read_text())["states"]
 
-    whole = states(tmp_path / "whole")
-
-    def cut(frames, count):
-        yield from list(frames)[:2]
-
-    part = tmp_path / "parts"
-    assert len(states(part, progress=cut)) == 2
-    asked = []
-    again = states(part, progress=lambda frames, count: asked.append(count) or frames)
-    assert again == whole
+    whole, part, asked = states(tmp_path / "whole"), tmp_path / "parts", []
+    assert len(states(part, progress=lambda frames, count: frames[:2])) == 2
+    assert states(part, progress=lambda frames, count: asked.append(count) or frames) == whole
     assert asked == [len(whole) - 2]
     with (part / "cycle.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == CYCLE_COLUMNS
     assert [float(row["damped_sticking"]) for row in rows] == [state["damped_sticking"] for state in whole]
     assert (part / "cycle.png").stat().st_size > 10_000
+
+
+def test_a_rigid_drive_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="rigid drive"):
+        cycle(make_run(tmp_path / "rigid.h5", spring="rigid", velocity=1e-3, until=0.2, states=0.1), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_state_at_rest_has_the_rates_of_stability(slow):

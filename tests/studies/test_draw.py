@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Growth
-from faultgouge.analysis.responses.normal_form import NormalForm
-from faultgouge.analysis.responses.power_law import PowerLaw
 from faultgouge.figures.series import draw_growth
-from faultgouge.studies.reproduce.triggering_figures import (
-    amplitude_figure,
-    eruption_figure,
-)
-from faultgouge.studies.triggering import Sensitivity
+from faultgouge.studies.reproduce.triggering_figures import eruption_figure
 
 
 @pytest.fixture
@@ -28,21 +22,6 @@ def test_eruption_draws_its_runs_their_control_and_the_crossing(runs):
         for line, (_, msd) in zip(drawn, (runs[2], runs[1], runs[1], runs[0]), strict=True):
             np.testing.assert_array_equal(line.get_ydata(), msd[msd > 0])
         assert set(threshold.get_xdata()) == {2.5}
-
-
-def normal_pairs(*epsilons):
-    """Pairs of the normal form, whose unit of time is one."""
-    return tuple(NormalForm(0.2, epsilon) for epsilon in epsilons)
-
-
-def test_amplitudes_carry_their_exponent():
-    distance = np.array([1e-7, 1e-2, 0.5])
-    found = Sensitivity(distance, normal_pairs(*distance), PowerLaw(-0.49989, 3e-5, 1.4))
-    _, fitted, points = amplitude_figure(found).axes[0].lines
-    np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 0.5]) ** -0.49989)
-    np.testing.assert_array_equal(points.get_ydata(), [pair.amplitude() for pair in found.pairs])
-    # of a response of less than four times the start no damping takes half
-    assert found.near == found.pairs[:2]
 
 
 def test_growth_draws_the_predicted_slope_beside_the_data():

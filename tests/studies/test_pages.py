@@ -1,29 +1,14 @@
 """What studies leave: pages that fit a screen and say what tables say; a picture that cannot be drawn costs no page."""
 
-import json
 from dataclasses import replace
 
 import pytest
 from reference_layer import SMALL
-from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
 from faultgouge.studies.reproduce.protocol import growth_run, recorded_ramp, report, summary_of
 from faultgouge.studies.sweep.draw import draw_sweep
-
-
-@pytest.fixture
-def no_pictures(monkeypatch):
-    def fails(*_, **__):
-        raise RuntimeError("no font at all\nand more of it")
-
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", fails)
-
-
-@pytest.fixture
-def messages():
-    return []
 
 
 @pytest.mark.long
@@ -34,30 +19,22 @@ def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_pa
     growth = growth_run(scene, run, tmp_path / "run.h5")
     first = replace(run, windows=run.windows[:1], complete=False)
     for each, cell in ((run, f"| {len(run.windows)} |"), (first, "| not counted, as the search ended with the")):
-        page = report(scene, [each], growth, None, None)
+        page = report(scene, [each], growth, "nothing", None)
         (row,) = (line for line in page.splitlines() if line.startswith("| 1 |"))
         assert cell in row
         assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.complete
 
 
-def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
-    tmp_path, reference_packing, faultgouge_here, no_pictures, monkeypatch
-):
-    def fails(*_):
-        raise LinAlgError("no convergence")
+def test_a_sweep_keeps_its_rows_and_draw_its_words(tmp_path, reference_packing, faultgouge_here, monkeypatch):
+    """Where a picture cannot be drawn."""
 
+    def fails(*_, **__):
+        raise RuntimeError("no font at all\nand more of it")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", fails)
+    said, result = [], {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}
+    assert draw_sweep([{"values": {"packing.seed": 1}, "result": result}], tmp_path, said.append) == ""
+    assert "results.png was not drawn (RuntimeError" in said[0]
     with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
         run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
-    monkeypatch.setattr("faultgouge.analysis.responses.transient.transient_gains", fails)
-    done = faultgouge_here("spectrum", "run.h5", "--gain", "--json")
-    result = json.loads(done.stdout)
-    assert len(result["eigenvalues"]) > 200
-    assert result["transient_gain"] is None
-    assert "the transient gain was not found (LinAlgError: no convergence); the eigenvalues are complete" in done.stderr
     assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stdout
-
-
-def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, messages):
-    row = {"values": {"packing.seed": 1}, "result": {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}}
-    assert draw_sweep([row], tmp_path, messages.append) == ""
-    assert "results.png was not drawn (RuntimeError" in messages[0]

@@ -1,9 +1,9 @@
 """The error of an onset, path and rounding together, covers the onset that the exact path has."""
 
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +12,9 @@ from scipy.linalg import LinAlgError
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
+from faultgouge.pywrap.runs.path_error import PathErrors, squared_gap, with_path_error
 from faultgouge.studies.onset import onset
+from faultgouge.studies.packing_tools import contact_pairs
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
 HUNDRED = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
@@ -35,14 +36,6 @@ def path_of(scene, mu=None):
     start = settle(scene, mu)
     with Engine(start.packing) as engine:
         yield scene_path(engine, start, scene)
-
-
-@pytest.mark.parametrize(("coarser", "weight"), [(1.04, 3.0), (1.0025, -0.75)], ids=["doubled", "halved"])
-def test_the_correction_leads_to_the_limit_of_small_increments(coarser, weight):
-    """Onsets 1 + 0.01 (h'/h)^2 of increments h' on the ramp, with increments twice and half as large."""
-    error = PathError(coarser - 1.01, 0.0, (), weight, False, 1e-9, 1e-2)
-    assert 1.01 + error.correction == pytest.approx(1.0, abs=1e-12)
-    assert error.error >= 0.01
 
 
 @pytest.mark.long
@@ -67,34 +60,24 @@ def test_stated_intervals_contain_the_extrapolated_onset(mu, below):
             assert found.error < 1e-7
 
 
-@pytest.mark.long
-def test_a_contact_that_slides_before_the_onset_is_covered():
-    """Of this packing a contact reaches the Coulomb bound before the onset: the error is bounded, not extrapolated."""
-    found = {}
-    for precision, increment in (("compensated", 2.5e-4), ("double", 1e-3), ("double", 5e-4)):
-        packing = {"disks": 100, "top": 10, "width": 11.9, "seed": 11}
-        sections = HUNDRED | {"packing": packing, "law": {"kn": 2e5, "mu": 0.2}}
-        scene = scene_of(sections, precision, increment, 3e-3)
-        with path_of(scene) as path:
-            window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = PathErrors(path).error(window.fx_onset, squared_gap(window.eigenvalue), window.error)
-        assert part.changes
-        assert part.correction == 0
-        found[precision, increment] = window.fx_onset, window.error + part.error
-    truth = found.pop(("compensated", 2.5e-4))
-    assert all(covers(onset, truth) for onset in found.values())
+SLIDES = {"packing": {"seed": 11}, "law": {"kn": 2e5, "mu": 0.2}}
+DAMPED = {"packing": {"disks": 30, "seed": 4}, "damping": {"cn": 0.5, "ct": 0.2}}
 
 
 @pytest.mark.long
-def test_onsets_with_dissipation_state_the_whole_error():
-    """Beside them stands the undamped onset, with its whole error."""
-    found = {}
-    for precision, increment in (("compensated", 5e-4), ("double", 2e-3), ("double", 1e-3)):
-        sections = HUNDRED | {"packing": {"disks": 30, "seed": 4}, "damping": {"cn": 0.5, "ct": 0.2}}
-        run = onset_run(scene_of(sections, precision, increment, 0.012), 1.0, dissipation=True)
-        found[precision, increment] = (run.fx_c, run.error), (run.undamped.fx_c, run.undamped.error)
-    truth = found.pop(("compensated", 5e-4))
-    assert all(covers(*pair) for onsets in found.values() for pair in zip(onsets, truth, strict=True))
+@pytest.mark.parametrize(
+    ("sections", "fine", "coarse", "until"), [(SLIDES, 2.5e-4, 5e-4, 3e-3), (DAMPED, 5e-4, 1e-3, 0.012)]
+)
+def test_onsets_state_the_whole_error(sections, fine, coarse, until):
+    """Also where a contact reaches the Coulomb bound before the onset, so that the error is bounded, not extrapolated,
+    and with dissipation, beside whose onset stands the undamped one."""
+    found = []
+    for precision, increment in (("compensated", fine), ("double", 2 * coarse), ("double", coarse)):
+        scene = scene_of(HUNDRED | sections, precision, increment, until)
+        run = onset_run(scene, scene.law.mus[0], dissipation=scene.damping is not None)
+        found.append([(each.fx_c, each.error) for each in (run, run.undamped) if each is not None])
+    truth, *others = found
+    assert all(covers(*pair) for onsets in others for pair in zip(onsets, truth, strict=True))
 
 
 @pytest.mark.long
@@ -116,20 +99,9 @@ def test_one_packing_per_seed_whatever_the_arithmetic():
     one, other = (
         settle(Scene.from_mapping(HUNDRED | {"precision": each})).packing for each in ("double", "compensated")
     )
-    pairs = [set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (one, other)]
-    assert pairs[0] == pairs[1]
+    assert contact_pairs(one) == contact_pairs(other)
     assert np.abs(one.position - other.position).max() < 1e-11
     assert other.residual < 1e-17
-
-
-def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
-    scene = scene_of(HUNDRED, "double", 1e-3, 0.02)
-    with path_of(scene) as path:
-        path(1e-3)
-        part = PathErrors(path).error(0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
-    assert np.isnan(part.shift)
-    assert part.correction == 0
-    assert part.error == pytest.approx(5e-4)
 
 
 @pytest.fixture(scope="module")
@@ -139,29 +111,24 @@ def climbed():
         yield path, find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
 
 
-@dataclass(frozen=True)
-class FailingSolver:
-    """Whatever is asked for beside what a path knows fails."""
-
-    failure: Exception
-
-    def solve(self, load, below, beside, ahead):
-        raise self.failure
-
-
-@pytest.mark.parametrize(
-    "failure",
-    [NoEquilibriumError("no equilibrium was found"), LinAlgError("no convergence"), OnsetError("a pair was lost")],
-    ids=lambda failure: type(failure).__name__,
-)
-def test_an_onset_is_kept_where_the_other_path_fails(climbed, failure):
-    path, found = climbed
-    alone = with_path_error(found, LoadPath(FailingSolver(failure), path.equilibria))
-    assert alone.windows == found.windows
-    assert alone.as_dict()["error_of_path"] is None
+def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment(climbed):
+    part = PathErrors(climbed[0]).error(0.0025, squared_gap(30.0), 1e-11)  # no pair coalesces there
+    assert np.isnan(part.shift)
+    assert (part.correction, part.error) == (0, pytest.approx(2.5e-3))
 
 
 def test_the_other_path_has_an_error_that_is_part_of_the_onsets(climbed):
     path, found = climbed
     whole = with_path_error(found, path)
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error
+
+
+@pytest.mark.parametrize("failure", [NoEquilibriumError, LinAlgError, OnsetError])
+def test_an_onset_is_kept_where_the_other_path_fails(climbed, failure):
+    def solve(load, below, beside, ahead):
+        raise failure("no other path")
+
+    path, found = climbed
+    alone = with_path_error(found, LoadPath(SimpleNamespace(solve=solve), path.equilibria))
+    assert alone.windows == found.windows
+    assert alone.as_dict()["error_of_path"] is None

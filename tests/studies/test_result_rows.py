@@ -20,7 +20,7 @@ def test_a_line_that_a_kill_has_cut_is_taken_off_and_another_is_named(tmp_path):
     append_row(table, {"seed": 1})
     with table.open("a") as file:
         file.write('{"seed": 2, "va')
-    assert read_keyed_rows(table, "seed", "a test") == [{"seed": 1}]
+    assert read_keyed_rows(table, ("seed",), "a test") == [{"seed": 1}]
     append_row(table, {"other": 3})
     with pytest.raises(SceneError, match="line 2 is no result of a test"):
-        read_keyed_rows(table, "seed", "a test")
+        read_keyed_rows(table, ("seed",), "a test")

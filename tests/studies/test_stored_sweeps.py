@@ -1,7 +1,6 @@
 """Stored rows of sweeps: for which scene, code and version they stand, what is tried again, and that none is lost."""
 
 import json
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.studies.sweep import sweep_plan
-from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
+from faultgouge.studies.sweep.run_sweep import merge, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings
 from faultgouge.studies.sweep.user_function import user_function
 
@@ -64,17 +63,13 @@ def folder(tmp_path):
     (tmp_path / "tools").mkdir()
     (tmp_path / "tools" / "numbers.py").write_text("from .deeper import number\n")
     (tmp_path / "tools" / "deeper.py").write_text("number = 1  # of nothing\n")
-    user_function.cache_clear()
     return tmp_path
 
 
 def sweep_of(folder, function, seeds="1:3"):
+    user_function.cache_clear()
     mapping = {"task": f"ask.py:{function}", "sweep": {"packing.seed": seeds}, "scene": SMALL}
     return Sweep.from_mapping(mapping, folder)
-
-
-def keys(sweep):
-    return [point.key for point in sweep.points]
 
 
 def shards(place, folder, function):
@@ -85,22 +80,14 @@ def shards(place, folder, function):
     return parts
 
 
-def change(folder, says=None, result=None):
-    """Make the first row of a folder another one."""
-    lines = (folder / "results.jsonl").read_text().splitlines()
-    first = json.loads(lines[0]) | {"says": says, "result": result or {}}
-    (folder / "results.jsonl").write_text("\n".join([json.dumps(first), *lines[1:]]) + "\n")
-    return first["key"]
-
-
 @pytest.mark.parametrize(
     ("name", "text", "same"),
     [
         ("tools/deeper.py", "number = 1  # of another", True),
         ("tools/deeper.py", "number = 2", False),
-        ("packing.json", "{ ", False),
+        ("packing.json", REFERENCE.read_text().replace("{", "{ ", 1), False),
         ("signal.txt", "0 0\n0.5 2e-3\n1 0\n", False),
-        ("pyproject.toml", "version", False),
+        (None, "0.9", False),
     ],
 )
 def test_a_row_is_known_by_all_that_its_number_depends_on(folder, monkeypatch, name, text, same):
@@ -111,17 +98,13 @@ def test_a_row_is_known_by_all_that_its_number_depends_on(folder, monkeypatch, n
     scene |= {"perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"}, "friction": {"v0": 1e-6, "v_ss": "10 v0"}}
 
     def known():
-        user_function.cache_clear()
-        return keys(sweep_of(folder, "imports")) + keys(
-            Sweep.from_mapping({"task": "triggering", "scene": scene}, folder)
-        )
+        triggering = Sweep.from_mapping({"task": "triggering", "scene": scene}, folder)
+        return [point.key for sweep in (sweep_of(folder, "imports"), triggering) for point in sweep.points]
 
     before = known()
     assert known() == before
-    if name == "pyproject.toml":
-        monkeypatch.setattr(sweep_plan, "version", lambda _: "0.9")
-    elif name == "packing.json":
-        (folder / name).write_text(REFERENCE.read_text().replace("{", text, 1))
+    if name is None:
+        monkeypatch.setattr(sweep_plan, "version", lambda _: text)
     else:
         (folder / name).write_text(text)
     assert (known() == before) is same
@@ -131,16 +114,22 @@ def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package
     package = tmp_path / "grains_of_mine"
     package.mkdir()
     monkeypatch.syspath_prepend(tmp_path)
-    (package / "__init__.py").write_text("")
-    (package / "tasks.py").write_text("import beside\nfrom . import numbers\ndef task(scene):\n    return {}\n")
-    (package / "numbers.py").write_text("one = 1")
-    (tmp_path / "beside.py").write_text("two = 2")
+    texts = {
+        "__init__": "",
+        "tasks": "import beside\nfrom . import numbers\ndef task(scene): ...",
+        "numbers": "one = 1",
+    }
+    for name, text in texts.items():
+        (package / f"{name}.py").write_text(text)
     found = []
-    for name, text in ((None, ""), ("beside.py", "two = 3"), ("grains_of_mine/numbers.py", "one = 2")):
-        if name:
-            (tmp_path / name).write_text(text)
+    for path, text in (
+        (tmp_path / "beside.py", "two = 2"),
+        (tmp_path / "beside.py", "2"),
+        (package / "numbers.py", ""),
+    ):
+        path.write_text(text)
         user_function.cache_clear()
-        found += keys(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}))
+        found.append(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}).points[0].key)
     assert found[0] == found[1] != found[2]
 
 
@@ -152,7 +141,6 @@ def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
     again = run_sweep(sweep, folder / "out", say=id)
     assert (folder / "calls").read_text().split() == ["1", "2", "3", "2"]
     assert [row["result"].get("seed") for row in again] == [None, 2, 3]
-    assert read_results(folder / "out" / "results.jsonl")[again[1]["key"]] == again[1]
     run_sweep(sweep, folder / "out", say=id)
     assert len((folder / "calls").read_text().split()) == 4
 
@@ -161,15 +149,18 @@ def test_rows_of_a_function_hold_its_numbers_or_say_why_not(folder):
     first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id, workers=2)
     rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
     assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
-    for function, says in (("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"), ("seed_of", "int: ")):
+    for function, says in (
+        ("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"),
+        ("seed_of", "returned 1: "),
+    ):
         first, second = run_sweep(sweep_of(folder, function, "1:2"), folder / function, say=id)
         assert says in first["says"]
         assert (second["says"] is None) is (function == "ends")
 
 
-def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(folder):
+def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(folder, monkeypatch):
     """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused.
-    What is no number is the same result again."""
+    What is no number is the same result again. The keys are those that the sweep had."""
     for function in ("ends", "nothing"):
         one, two = shards(folder / function, folder, function)
         half = (one / "results.jsonl").read_text() + '{"key": "0123'
@@ -182,45 +173,40 @@ def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(fol
         assert (whole / "results.jsonl").read_text() == before
         assert (one / "results.jsonl").read_text() == half
         assert len((whole / "results.csv").read_text().splitlines()) == 4
-    run_sweep(sweep_of(folder, "ends", "7:9"), folder / "precious", say=id)
-    files = {path: path.read_bytes() for path in (folder / "precious").iterdir()}
-    with pytest.raises(SceneError, match=r"precious is of another sweep than .*part1"):
-        merge([one, two], folder / "precious", id)
-    assert {path: path.read_bytes() for path in (folder / "precious").iterdir()} == files
+    other = folder / "other"
+    run_sweep(sweep_of(folder, "ends", "7:9"), other, say=id)
+    files = {path: path.read_bytes() for path in other.iterdir()}
+    with pytest.raises(SceneError, match=r"other is of another sweep than .*part1.* \(task differs\)"):
+        merge([one, two], other, id)
+    assert {path: path.read_bytes() for path in other.iterdir()} == files
+    monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
+    run_sweep(sweep_of(folder, "nothing"), two, (2, 2), say=id)
+    with pytest.raises(SceneError, match=r"part2 is of another sweep than .*part1.* \(version differs\)"):
+        merge([one, two], folder / "new", id)
+    for text in ('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}', "no JSON", "3"):
+        (one / "sweep.json").write_text(text)
+        with pytest.raises(SceneError, match=r"part1 is no folder of a sweep, or of version 1\.0\.0 or before"):
+            merge([one, two], folder / "new", id)
+    assert not (folder / "new").exists()
 
 
 def test_a_good_row_goes_before_an_error_and_two_results_are_named(folder):
-    for name in ("good", "bad", "other"):
+    for name, change in (("good", {}), ("bad", {"says": "out of memory"}), ("other", {"result": {"seed": 5}})):
         run_sweep(sweep_of(folder, "ends", "2:3"), folder / name, say=id)
-    change(folder / "bad", says="out of memory")
-    key = change(folder / "other", result={"seed": 5})
+        first, second = (folder / name / "results.jsonl").read_text().splitlines()
+        (folder / name / "results.jsonl").write_text(f"{json.dumps(json.loads(first) | change)}\n{second}\n")
     for number, names in enumerate((("good", "bad"), ("bad", "good"))):
         rows = merge([folder / name for name in names], folder / f"whole{number}", id)[1]
         assert [row["result"] for row in rows] == [{"seed": 2}, {"seed": 3}]
-    with pytest.raises(SceneError, match=rf"good/results.jsonl and .*other/results.jsonl have .*seed = 2; key {key}"):
+    with pytest.raises(SceneError, match=rf"good/.*jsonl and .*other/.*jsonl have .*seed = 2; key {rows[0]['key']}"):
         merge([folder / "good", folder / "other"], folder / "whole", id)
     assert not (folder / "whole" / "results.csv").exists()
-
-
-def test_merge_takes_the_keys_that_the_sweep_had_and_names_versions(folder, monkeypatch):
-    one, two = shards(folder, folder, "ends")
-    (folder / "ask.py").unlink()
-    assert len(merge([one, two], folder / "whole", id)[1]) == 3
-    (folder / "ask.py").write_text(TASK)
-    monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
-    run_sweep(sweep_of(folder, "ends"), two, (2, 2), say=id)
-    with pytest.raises(SceneError, match=r"part2 is of version 0.9, and .*part1 of "):
-        merge([one, two], folder / "whole", id)
-    (one / "sweep.json").write_text('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}')
-    with pytest.raises(SceneError, match=r"part1 is of version 1\.0\.0 or before"):
-        merge([one, two], folder / "whole", id)
 
 
 def test_rows_of_other_code_stay_and_are_told(folder):
     run_sweep(sweep_of(folder, "ends"), folder / "out", say=id)
     before, said = (folder / "out" / "results.jsonl").read_text(), []
     (folder / "ask.py").write_text(TASK.replace('{"seed": scene.packing.seed}', '{"seed": 2 * scene.packing.seed}'))
-    user_function.cache_clear()
     rows = run_sweep(sweep_of(folder, "ends"), folder / "out", say=said.append)
     assert [row["result"].get("seed") for row in rows] == [None, 4, 6]
     assert said == ["3 rows there are of other scenes, code or versions, and are not in the table"]
@@ -238,33 +224,25 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
     faultgouge_here("sweep", "fails.toml", "-o", "some", "--workers", "1")  # one has failed, and one has not
 
 
-def test_an_overburden_that_varies_is_a_load_that_does():
-    path = Path(__file__).parents[2] / "scenes" / "sweeps" / "depth.toml"
-    sweep = Sweep.from_toml(path)
-    assert other_packings(sweep) is None
-    loads = [point.scene.load.fy for point in sweep.points[::20]]
-    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
-    settled = {key: value for key, value in sweep.scene["packing"].items() if key != "settle_at"}
-    plain = replace(sweep, scene=sweep.scene | {"packing": settled})
-    assert other_packings(plain).startswith("units.overburden: settling is chaotic")
-
-
 @pytest.mark.parametrize(
-    ("axes", "changes", "named"),
+    ("axes", "packing", "named"),
     [
         ({"load.fy": [3.0, 3.001], "packing.seed": "1:2"}, {}, "load.fy"),
-        ({"law.kn": [1e5, 2e5]}, {}, "law.kn"),
-        ({"law.mu": [0.5, 1.0]}, {}, None),
-        ({"law.mu": [0.5, 1.0]}, {"packing": {"settle_friction": True}}, "law.mu"),
-        ({"load.fy, packing.seed": [[3.0, 1], [4.0, 2]]}, {}, None),  # no seed has two loads
-        ({"law.kn, load.fy": [[2e5, 3.0], [4e5, 6.0]]}, {}, None),  # one packing in two units of force
-        ({"packing.seed": "1:3"}, {}, None),
-        ({"load.fy": [3.0, 3.001]}, {"packing": {"settle_at": {"fy": 3.0}}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0, "kn": 2e5}}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0}}}, "law.kn"),  # settled at each stiffness
+        ({"law.mu": [0.5, 1.0], "packing.seed": "1:3"}, {}, None),
+        ({"law.mu": [0.5, 1.0]}, {"settle_friction": True}, "law.mu"),
+        ({"load.fy": [3.0, 3.001]}, {"settle_at": {"fy": 3.0}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0, "kn": 2e5}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0}}, "law.kn"),  # settled at each stiffness
     ],
 )
-def test_a_sweep_says_where_a_seed_is_several_packings(axes, changes, named):
-    scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
+def test_a_sweep_says_where_a_seed_is_several_packings(axes, packing, named):
+    scene = SMALL | {"packing": SMALL["packing"] | packing}
     says = other_packings(Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": scene}))
     assert says is None if named is None else says.startswith(f"{named}: settling is chaotic")
+
+
+def test_an_overburden_that_varies_is_a_load_that_does():
+    sweep = Sweep.from_toml(Path(__file__).parents[2] / "scenes" / "sweeps" / "depth.toml")
+    assert other_packings(sweep) is None  # settled at one load
+    loads = [point.scene.load.fy for point in sweep.points[::20]]
+    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)

@@ -33,29 +33,25 @@ def msd_with_jump(height, at, then=0.0):
 
 STABLE, UNSTABLE = Forecast(1.55e-12, 0.0, 1.2, 0.0), Forecast(1e-16, 9.0, 5.0, 0.1)
 QUIET = Forecast(1e-16, 0.0, 5.0, 0.0)
-CASES = {
-    # the whole jump, after the first twentieth of the run: no growth over 13.6 decades
-    "late jump": (run_of(msd_with_jump(1.5e-12, 265.0), 265.0), STABLE, "jump alone"),
-    # nothing but rounding: the first twentieth has a smaller D than the rest
-    "noise": (run_of(noise(), None), STABLE, "does not weaken"),
-    "at the end": (run_of(msd_with_jump(1e-12, 390.0), 390.0), STABLE, "too short"),
-    "grows": (
-        run_of(msd_with_jump(1e-16, 50.0, 0.1), 50.0),
-        UNSTABLE,
-        "grows",
-    ),
-    "faster": (run_of(msd_with_jump(1e-16, 50.0, 0.16), 50.0), UNSTABLE, "unexplained"),
-    "nothing grows": (run_of(msd_with_jump(1e-16, 50.0, 0.1), 50.0), QUIET, "unexplained"),
-    # beyond the jump of its first moments, but not beyond the one that is foreseen
-    "foreseen": (
-        run_of(msd_with_jump(1e-16, 50.0, 0.02), 50.0),
-        Forecast(1e-15, 0.1, 1.2, 0.1),
-        "jump alone",
-    ),
-}
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_only_growth_at_the_rate_of_the_spectrum_and_beyond_the_jump_is_an_instability(case):
-    run, foreseen, verdict = CASES[case]
-    assert judge(run, V0, foreseen).verdict == verdict
+@pytest.mark.parametrize(
+    ("msd", "crossing", "foreseen", "verdict"),
+    [
+        # the whole jump, after the first twentieth of the run: no growth over 13.6 decades
+        (msd_with_jump(1.5e-12, 265.0), 265.0, STABLE, "jump alone"),
+        # nothing but rounding: the first twentieth has a smaller D than the rest
+        (noise(), None, STABLE, "does not weaken"),
+        (msd_with_jump(1e-12, 390.0), 390.0, STABLE, "too short"),
+        (msd_with_jump(1e-16, 50.0, 0.1), 50.0, UNSTABLE, "grows"),
+        (msd_with_jump(1e-16, 50.0, 0.16), 50.0, UNSTABLE, "unexplained"),
+        (msd_with_jump(1e-16, 50.0, 0.1), 50.0, QUIET, "unexplained"),
+        # beyond the jump of its first moments, but not beyond the one that is foreseen
+        (msd_with_jump(1e-16, 50.0, 0.02), 50.0, Forecast(1e-15, 0.1, 1.2, 0.1), "jump alone"),
+    ],
+    ids=["late jump", "noise", "at the end", "grows", "faster", "nothing grows", "foreseen"],
+)
+def test_only_growth_at_the_rate_of_the_spectrum_and_beyond_the_jump_is_an_instability(
+    msd, crossing, foreseen, verdict
+):
+    assert judge(run_of(msd, crossing), V0, foreseen).verdict == verdict

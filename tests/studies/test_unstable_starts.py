@@ -7,7 +7,6 @@ from reference_layer import toml
 
 from faultgouge.analysis import spectrum
 from faultgouge.pywrap import Scene, ramp, settle
-from faultgouge.studies.statistics import sign_test
 from faultgouge.studies.triggering import in_words, summary_of_rows, triggering
 
 UNSTABLE = {
@@ -22,20 +21,15 @@ UNSTABLE = {
 BEFORE = "unstable at F_x = 0, before any shear is added"
 
 
-@pytest.fixture(autouse=True)
-def _scene(tmp_path):
-    (tmp_path / "scene.toml").write_text(toml(UNSTABLE))
-
-
-@pytest.fixture(scope="module")
-def pairs():
+def pairs_at_rest():
     """Complex pairs at F_x = 0 of either friction coefficient."""
     scene = Scene.from_mapping(UNSTABLE)
     return [len(spectrum(settle(scene, mu).packing).pairs) for mu in scene.law.mus]
 
 
 @pytest.mark.slow
-def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tmp_path, pairs):
+def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tmp_path):
+    pairs = pairs_at_rest()
     (tmp_path / "scene.toml").write_text(toml(UNSTABLE | {"law": {"kn": 2e5, "mu": 0.5}}))
     said = faultgouge_here("onset", "scene.toml", "-o", "onset.json").stdout
     assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs; in the fastest motion D grows as exp(" in said
@@ -45,8 +39,10 @@ def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tm
 
 
 @pytest.mark.long
-def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, pairs):
+def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, tmp_path):
     """As many windows hold a load as LAPACK finds pairs in the equilibrium there; those of the start begin at zero."""
+    pairs = pairs_at_rest()
+    (tmp_path / "scene.toml").write_text(toml(UNSTABLE))
     done = faultgouge_here("onset", "scene.toml", "--all", "--json")
     found = json.loads(done.stdout)["each_mu"]
     assert [each["mu"] for each in found] == UNSTABLE["law"]["mu"]
@@ -71,8 +67,3 @@ def test_a_sweep_infers_nothing_of_weakening():
     assert [(each["ends"], each["reach"]) for each in found["ramps"]] == [("onset", 0.0)] * 2
     assert found["lowered"] is None
     assert "both packings are unstable" in "\n".join(in_words(summary_of_rows([{"result": found, "says": None}])))
-
-
-def test_two_unstable_starts_do_not_tell_whether_the_onset_is_lower():
-    start, later = {"ends": "onset", "reach": 0.0}, {"ends": "onset", "reach": 0.01}
-    assert [sign_test(*each) for each in ((start, start), (later, start), (start, later))] == [None, True, False]

@@ -5,9 +5,8 @@ A command is a function with the decorator :func:`~faultgouge.commands.terminal.
 imported inside the command that needs them. Commands raise errors and never print them: :mod:`faultgouge.cli` does.
 """
 
-import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -22,42 +21,13 @@ FAMILIES = "runs", "packings", "onset", "pictures", "files", "studies"
 """Modules with commands."""
 
 
-class CommandsByName(Mapping[str, Any]):
-    """Commands, each made when it is asked for: to make all takes a fifth of the time of ``faultgouge --help``."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, Any] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self._made:
-            if (info := COMMANDS.get(name) or study_command(name)) is None:
-                raise KeyError(name)
-            alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-            alone.registered_commands.append(info)
-            self._made[name] = typer.main.get_command(alone)
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return (name for name, _ in self.summaries())
-
-    def __len__(self) -> int:
-        return len(self.summaries())
-
-    def summaries(self) -> list[tuple[str, str]]:
-        """Each command, with the first sentence of its docstring."""
-        own = sorted(COMMANDS.items(), key=lambda each: FAMILIES.index(each[1].callback.__module__.split(".")[-1]))
-        studies = {name: info for name in registered.names() if (info := study_command(name))}
-        return [(name, _first_sentence(info.callback)) for name, info in (dict(own) | studies).items()]
-
-
 class CommandGroup(TyperGroup):
-    """A group whose commands are `CommandsByName`; its help needs their names and docstrings alone."""
-
-    commands: Any  # a mapping, which nobody changes
+    """A group whose help has the whole first sentence of each command."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl(self.commands.summaries())
+            helps = {name: " ".join((each.help or "").split("\n\n")[0].split()) for name, each in self.commands.items()}
+            formatter.write_dl([(name, re.split(r"(?<=\.)\s", text)[0]) for name, text in helps.items()])
 
 
 def program() -> Callable[..., object]:
@@ -72,26 +42,13 @@ def program() -> Callable[..., object]:
         "faultgouge init -o scene.toml && faultgouge onset scene.toml",
     )
     app.callback()(_options)
-    for family in FAMILIES:
-        import_module(f".{family}", __name__)
-    group = typer.main.get_command(app)
-    assert isinstance(group, CommandGroup)
-    group.commands = CommandsByName()
-    return group
+    families = [import_module(f".{family}", __name__).__name__ for family in FAMILIES]
+    own = sorted(COMMANDS.values(), key=lambda each: families.index(each.callback.__module__))
+    app.registered_commands = [*own, *filter(None, map(study_command, registered.names()))]
+    return typer.main.get_command(app)
 
 
 QUESTION = "Does a packing of frictional grains move, and what happens when it does?"
-
-TO_TRY = f"""\
-{QUESTION} Two things to try:
-
-  faultgouge stability deck.in      runs a LAMMPS deck: does its packing rest, or which motion grows, and how fast?
-  faultgouge init -o scene.toml && faultgouge onset scene.toml
-                                    the shear force at which a layer of 100 disks becomes unstable
-
-A deck and a scene to try: faultgouge examples. All commands: faultgouge --help. Each has an example: faultgouge
-stability --help.
-"""
 
 
 def _options(
@@ -101,7 +58,7 @@ def _options(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        print(TO_TRY, end="")
+        print(context.get_help())
 
 
 def _version(asked: bool) -> None:
@@ -111,8 +68,3 @@ def _version(asked: bool) -> None:
 
         print(f"faultgouge {version('faultgouge')} (LAMMPS {version('lammps')})")
         raise typer.Exit()
-
-
-def _first_sentence(function: Any) -> str:
-    first, *_ = (inspect.getdoc(function) or "").split("\n\n")
-    return re.split(r"(?<=\.)\s", " ".join(first.split()))[0]

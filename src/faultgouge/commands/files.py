@@ -31,7 +31,6 @@ from .terminal import (
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.analysis.files.formats import Disks
-    from faultgouge.pywrap import Scene
 
 OF_SOURCE = (
     "A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or LAMMPS "
@@ -60,13 +59,10 @@ def import_(
     top: Annotated[str | None, Option(metavar="LAYER", help=OF_LAYER)] = None,
     scene: Annotated[Path | None, Option(help="Law, load, damping and inertia of this scene.")] = None,
     kn: Annotated[float | None, Option(help="Normal stiffness, without a scene.")] = None,
-    kt: Annotated[str | None, Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
     mu: Annotated[float | None, Option(help="Friction coefficient; 1 by default.")] = None,
-    exponent: Annotated[float | None, Option(help="1.5 (Hertz, the default) or 1.")] = None,
     fy: Annotated[float | None, Option(help="Load on each disk of the layer.")] = None,
     fx: Annotated[float | None, Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
-    inertia: Annotated[float | None, Option(help="I_0 in I = I_0 m R^2; 1 by default.")] = None,
-    floor: Annotated[float, Option(help=OF_FLOOR)] = 0.0,
+    floor: Annotated[float | None, Option(help=OF_FLOOR)] = None,
     width: Annotated[
         str | None, Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
     ] = None,
@@ -96,57 +92,46 @@ def import_(
     LAMMPS first runs on with drag until the packing rests. A state that cannot be
     taken is kept in a restart file, with a deck that goes on from it.
     """
-    from faultgouge.analysis import BadInputError, PackingFileError
-    from faultgouge.analysis.files.configuration_file import write_configuration
-    from faultgouge.pywrap.granular.balance import BALANCE
-    from faultgouge.pywrap.granular.run_deck import run_deck
+    from faultgouge.door import is_deck
 
     if material is not None:
         yield from _spheres(file, output, material, contacts, columns, -1 if frame is None else frame)
         return
-    is_bare = not floor and all(
-        each is None for each in (top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame)
-    )
+    options: dict[str, Any] = {"kn": kn, "mu": mu, "fy": fy, "fx": fx, "top": top, "scene": scene, "floor": floor}
+    options |= {"width": width, "contacts": contacts, "frame": frame}
+    given = {key: value for key, value in options.items() if value is not None}
     kept = file.with_name(f"{file.name}.in")
-    if is_bare and file.suffix == ".restart" and kept.is_file():
+    if not given and file.suffix == ".restart" and kept.is_file():
         file = kept
-    if file.suffix == ".in" or file.name.startswith("in."):
-        if not is_bare:
-            raise typer.BadParameter(
-                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
-            )
-        keeps(f"nothing has been written to {output} yet")
-        text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
-        allowed = BALANCE if balance is None else balance
-        with status(f"{file}: LAMMPS runs") as show:
-            found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
-        keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
-        if is_root():
-            write_configuration(output, found, {"deck": text})
-            yield from _deck_in_words(found, output)
-        return
-    if slides or balance is not None:
-        raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
-    given = {"kn": kn, "kt": _number(kt), "mu": mu, "exponent": exponent, "fy": fy, "fx": fx, "inertia_factor": inertia}
-    try:
-        disks = _disks(file, frame, floor, width, contacts)
-        packing = _packing(disks, top, scene, {key: value for key, value in given.items() if value is not None})
-    except (PackingFileError, BadInputError) as error:
-        if lines := _deck_around(file) if is_bare else "":
-            raise type(error)(f"{error}\n{lines}") from error
-        raise
-    yield from _import_disks(file, output, disks, packing, relax)
+    if not is_deck(file):
+        if slides or balance is not None:
+            raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+        yield from _disks(file, output, relax, given)
+    elif given:
+        raise typer.BadParameter(
+            f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
+        )
+    else:
+        yield from _deck(file, output, relax, slides, balance)
 
 
-def _in_words(found: object, output: Path) -> str:
-    return f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
-
-
-def _deck_in_words(found: Any, output: Path) -> Results:
-    """The packing that LAMMPS left, its largest stable time step beside Rayleigh's, and whether it is stable."""
+def _deck(file: Path, output: Path, relax: bool, slides: bool, balance: float | None) -> Results:
+    """Store what a deck leaves; its largest stable time step beside Rayleigh's, and whether it is stable."""
     from faultgouge.analysis import rayleigh_timestep, stable_timestep
+    from faultgouge.analysis.files.configuration_file import write_configuration
+    from faultgouge.pywrap.granular.balance import BALANCE
+    from faultgouge.pywrap.granular.run_deck import run_deck
 
-    yield _in_words(found, output)
+    keeps(f"nothing has been written to {output} yet")
+    text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
+    allowed = BALANCE if balance is None else balance
+    with status(f"{file}: LAMMPS runs") as show:
+        found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`")
+    if not is_root():
+        return
+    write_configuration(output, found, {"deck": text})
+    yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
     step, usual = stable_timestep(found), rayleigh_timestep(found)
     beside = "" if usual is None else f", {step / usual:.3g} of Rayleigh's formula ({usual:.4g})"
     yield f"largest stable time step {step:.4g}{beside}"
@@ -168,24 +153,23 @@ def _spheres(
     )
     from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
 
+    if not is_root():
+        return
     law = material_of(material)
     if contacts is not None and is_measured(contacts):
         with working("draws of the forces"):
             found, counts = measured_forces(file, contacts, law, frame)
-        if is_root():
-            write_configuration(output, found, {"deck": ""})
-            yield "\n".join([f"written to {output}", *counts])
+        write_configuration(output, found, {"deck": ""})
+        yield "\n".join([f"written to {output}", *counts])
         return
     spheres = read_spheres(file, frame)
     if contacts is None:
         found = of_material(spheres, law)
     else:
         found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
-    if not is_root():
-        return
     write_configuration(output, found, {"deck": ""})
-    keeps(f"{output} has been written", output)
-    yield _in_words(found, output)
+    keeps(f"{output} has been written")
+    yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
     if contacts is None:
         yield "\n".join(found.remarks)
         return
@@ -194,84 +178,32 @@ def _spheres(
     yield f"{verdict}\n{says}"
 
 
-def _disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
-    """The disks of the file; options replace numbers of the file."""
+def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Results:
+    """Store disks of another code in balance, or brought to rest if that is wanted, and say what they are."""
+    from faultgouge.analysis import BadInputError, PackingFileError, RunFile
+    from faultgouge.analysis.files.formats import DATA, RESTART, format_of
     from faultgouge.analysis.files.formats.tables import read_slips
-    from faultgouge.pywrap.lammps.restart_file import read_disks
-
-    disks = read_disks(file, frame).above(floor)
-    if width is not None:
-        period = None if width == "open" else _number(width)
-        if period is not None and not (isinstance(period, float) and period > 0):
-            raise typer.BadParameter(f"--width {width}: give the period along x, above 0, or open")
-        disks = replace(disks, box_length=period)
-    if contacts is None:
-        return disks
-    given = {key: value for key, value in disks.given.items() if key != "slips_known"}
-    return replace(disks, slips=read_slips(contacts, disks.length_unit), given=given)
-
-
-def _number(text: str | None) -> float | str | None:
-    """A number, or the text that is none."""
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return text
-
-
-def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
-    """The packing under the law and the load of the scene, of the options, or of the file.
-
-    All that none of them says is told in one sentence, with the command that would do.
-    """
-    from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats import packing_of, upper_layer
-    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
-    from faultgouge.pywrap.settling.settle import law_of, load_of
-
-    decided = [f"--{key.removesuffix('_factor')}" for key in options if key != "fx"]
-    if scene is not None and decided:
-        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
-    values = options if scene else {**disks.given, **options}
-    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
-    if scene is None and "kn" not in values:
-        gaps["--kn 2e5"] = "the normal stiffness"
-    if scene is None and "fy" not in values:
-        gaps["--fy 3"] = "the load on each disk of the upper layer"
-    if gaps:
-        *others, last = gaps.values()
-        missing = f"{', '.join(others)} and {last}" if others else last
-        ways = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
-        names = " ".join(each.split()[0] for each in gaps)
-        example = f"faultgouge import ... {' '.join(gaps)}"
-        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{ways}")
-    layer = upper_layer(disks, top)
-    wanted = _scene(scene, values, float(disks.radius.min()))
-    load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
-    return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
-
-
-def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
-    """The scene, or a scene made of options and file; its disks have the smallest radius of the packing."""
-    from faultgouge.pywrap.scenes.scene import Scene
-
-    sections: dict[str, Any] = {"packing": {"radii": [smallest], "width": 20 * smallest}}
-    if scene is not None:
-        return Scene.from_toml(scene, packing=sections["packing"], command="settle")
-    history = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
-    for name, keys in (("law", ("kn", "kt", "mu", "exponent")), ("damping", ("cn", "ct", "tau")), ("load", ("fy",))):
-        if section := {key: values[key] for key in keys if key in values}:
-            sections[name] = section
-    return Scene.from_mapping(sections | {"law": sections["law"] | {"history": history}})
-
-
-def _import_disks(file: Path, output: Path, disks: Disks, packing: Packing, relax: bool) -> Results:
-    """Store a packing in balance, or brought to rest if that is wanted, and say what it is."""
-    from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+    from faultgouge.pywrap.lammps.restart_file import read_disks
     from faultgouge.pywrap.settling.relax import bring_to_rest
     from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE
 
+    try:
+        disks = read_disks(file, given.get("frame")).above(given.get("floor", 0.0))
+        if (width := given.get("width")) is not None:
+            if not re.fullmatch(r"open|[\d.]*[1-9][\d.]*(e[-+]?\d+)?", width):
+                raise typer.BadParameter(f"--width {width}: give the period along x, above 0, or open")
+            disks = replace(disks, box_length=None if width == "open" else float(width))
+        if "contacts" in given:
+            known = {key: value for key, value in disks.given.items() if key != "slips_known"}
+            disks = replace(disks, slips=read_slips(given["contacts"], disks.length_unit), given=known)
+        packing = _packing(disks, given)
+    except (PackingFileError, BadInputError) as error:
+        if given or not file.is_file() or format_of(file) not in (DATA, RESTART):
+            raise
+        reads = "read_restart" if format_of(file) is RESTART else "units lj, atom_style sphere and read_data"
+        says = f"For spheres, or another law, write a deck with {reads} {file.name}, its laws, its walls and a run,"
+        raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
     if disks.remark:
         say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
@@ -300,38 +232,41 @@ def _import_disks(file: Path, output: Path, disks: Disks, packing: Packing, rela
     )
 
 
-AROUND = """\
-pair_style gran/hertz/history 1e5 NULL 50 NULL 0.5 1   # the contact law: KN KT GAMMA_N GAMMA_T MU
-pair_coeff * *
-fix floor all wall/gran hertz/history 1e5 NULL 50 NULL 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.0
-timestep 1e-4
-run 100000   # until it rests; 0 for a restart at rest"""
+def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
+    """The packing under the law and the load of a scene, of the options, or of the file; what none says is named."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.analysis.files.atomic_write import telling
+    from faultgouge.analysis.files.formats import packing_of, upper_layer
+    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
+    from faultgouge.analysis.files.runfile import law_of_parameters
+    from faultgouge.pywrap.scenes.scene import Scene
+    from faultgouge.pywrap.settling.settle import law_of, load_of
 
-
-def _deck_around(file: Path) -> str:
-    """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
-    from faultgouge.analysis.files.formats import RESTART_BEGINNING
-
-    if not file.is_file():
-        return ""
-    with file.open("rb") as stream:
-        first = stream.readline(500)
-    head = first.decode(errors="replace")
-    if first.startswith(RESTART_BEGINNING):
-        reads = f"comm_modify vel yes\nread_restart {file.name}"
-    elif head.startswith("LAMMPS data file"):
-        units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
-        reads = f"units {units}\natom_style sphere\nboundary f f f\ncomm_modify vel yes\nread_data {file.name}"
+    options: dict[str, Any] = {key: given[key] for key in ("kn", "mu", "fy", "fx") if key in given}
+    top, scene = given.get("top"), given.get("scene")
+    if scene is not None and (decided := [f"--{key}" for key in options if key != "fx"]):
+        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
+    values = options if scene else {**disks.given, **options}
+    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
+    if scene is None:
+        ways = {"kn": ("--kn 2e5", "the normal stiffness"), "fy": ("--fy 3", "the load on each disk of the layer")}
+        gaps |= dict(way for key, way in ways.items() if key not in values)
+    if gaps:
+        names, example = " ".join(each.split()[0] for each in gaps), f"faultgouge import ... {' '.join(gaps)}"
+        takes = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
+        missing = " and ".join(gaps.values())
+        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{takes}")
+    layer = upper_layer(disks, top)
+    if scene is not None:
+        smallest = float(disks.radius.min())
+        wanted = Scene.from_toml(scene, packing={"radii": [smallest], "width": 20 * smallest}, command="settle")
+        law, load = law_of(wanted, wanted.law.mus[0]), load_of(wanted)
     else:
-        return ""
-    deck = file.with_suffix(".in").name
-    return (
-        f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
-        f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
-    )
+        with telling(disks.source, "describes no possible packing", ValueError):
+            law = law_of_parameters({"kt": 2 * values["kn"] / 7, "mu": 1.0} | values)
+        inertia = values.get("inertia_factor", 1.0)
+        load = {"fy": values["fy"], "drag_time": values.get("tau"), "inertia_factor": inertia}
+    return packing_of(disks, law, layer, **load, fx=values.get("fx", 0.0))
 
 
 @command(f"{RAMPED} && faultgouge export run.h5 --mode pair", alone=True)
@@ -355,7 +290,7 @@ def export(
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
-    from faultgouge.analysis import Configuration, PackingFileError, RunFile
+    from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.formats import (
         ModeVectors,
         check_writer,
@@ -383,5 +318,5 @@ def export(
         check_writer(output, mode is not None)
         modes = [] if mode is None else modes_of(packing, mode)[0]
         vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-        load = "" if isinstance(packing, Configuration) else f"F_x = {packing.fx:g}: "
+        load = f"F_x = {packing.fx:g}: " if packing.top.any() else ""
         yield f"{load}{write_packing(output, packing, vectors)}; written to {output}"

@@ -5,44 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from typer import Option
 
 from ..analysis.counted import counted
 from ..analysis.table_display import table_of
 from ..signal_guard import is_root, keeps
-from .terminal import Results, SceneFile, command, report_fallback, say, status, working
+from .terminal import LAYER, Results, SceneFile, command, report_fallback, say, status, working
 
 if TYPE_CHECKING:
     from ..analysis import Onset
     from ..pywrap import Scene
 
-OF_SLICES = (
-    "Folder for the results of a long search, which continues from the results there. Jobs that name the same folder "
-    "share the search. By default -o FILE has its own folder until the search is done."
-)
-OF_MODES = (
-    "Search only these modes, counted by frequency from 0, since all modes of 100,000 disks take hours. 0:600 are the "
-    "600 lowest."
-)
 
-
-@command(
-    "faultgouge examples scene && faultgouge onset scene.toml --json",
-    reads="onset",
-    task="onset",
-    writes="file",
-    as_json=True,
-    aloud=True,
-)
+@command(f"{LAYER} && faultgouge onset scene.toml --json", reads="onset", writes="file", as_json=True)
 def onset(
     scene: SceneFile,
     output: Annotated[
         Path | None,
         Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
     ] = None,
-    modes: Annotated[str | None, Option(metavar="FIRST:STOP", help=OF_MODES)] = None,
-    slices: Annotated[Path | None, Option(metavar="FOLDER", help=OF_SLICES)] = None,
     every: Annotated[
         bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer.")
     ] = False,
@@ -55,109 +36,64 @@ def onset(
     to the end of the ramp. Of several friction coefficients those without an onset
     are named; the exit code is 1 if none has one.
     """
-    from faultgouge.analysis import NoEquilibriumError, OnsetError
-    from faultgouge.analysis.files.atomic_write import make_folder
-    from faultgouge.analysis.windows.store import remove_passes
+    from faultgouge.analysis import BadInputError, NoEquilibriumError, OnsetError
+    from faultgouge.analysis.files.atomic_write import write_json
+    from faultgouge.analysis.windows import LIMITS
+    from faultgouge.analysis.windows.slices import remove_results
     from faultgouge.pywrap.settling.settle import shared_bed
 
-    part = _checked_modes(scene, modes, every)
+    if every and (disks := scene.packing.disks) > LIMITS.all_windows:
+        raise BadInputError(
+            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
+            "out for the first window, or take a smaller packing"
+        )
     # a long search leaves what it finds beside its file, unless that is a device
     folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
-    if slices:
-        make_folder(folder := slices)
     with working("settling"):
         bed = shared_bed(scene)
     found: list[dict[str, Any]] = []
     failed: Exception | None = None
     for mu in scene.law.mus:
         try:
-            onset = _search(scene, mu, part, not every, bed, output, folder, found)
-            yield from _in_words(scene, onset, part)
-            found.append({"mu": mu} | onset.as_dict() | {"flows_beyond": onset.flows_beyond} | _in_si(scene, onset))
+            each = _search(scene, mu, not every, bed, folder)
+            yield from _in_words(scene, each)
+            found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | _in_si(scene, each))
         except (OnsetError, NoEquilibriumError) as error:
             failed = error
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
             if undamped := getattr(error, "undamped", None):
                 found[-1] |= {"windows": [], "undamped": {"fx_c": undamped.fx_c, "error": undamped.error}}
-                yield _undamped_in_words(mu, undamped)
+                yield f"mu = {mu:g}: without dissipation {undamped.describe()}"
             if len(scene.law.mus) > 1:
                 yield f"mu = {mu:g}: no onset: {error}"
-    if any(each["fx_c"] is not None for each in found):
-        failed = None
-    elif len(found) > 1:
+    first = next((each for each in found if each["fx_c"] is not None), None)
+    if first is None and len(found) > 1:
         failed = OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
-    if failed is None or any("undamped" in each for each in found):
+    if first is not None or any("undamped" in each for each in found):
         yield f'law of friction: {scene.law.in_words} (history = "{scene.law.history}")'
-        yield _document(output, found)
-        if is_root() and folder is not None and not slices:
-            remove_passes(folder)  # the result is there
-    if failed is not None:
+        result = (first or found[0]) | ({"each_mu": found} if len(found) > 1 else {})
+        if output and is_root():
+            write_json(output, result)
+        yield result
+        if is_root() and folder is not None:
+            remove_results(folder)  # the result is there
+    if first is None and failed is not None:
         raise failed
 
 
-def _checked_modes(scene: Scene, modes: str | None, every: bool) -> tuple[int, int] | None:
-    """FIRST:STOP as numbers; options that do not go together are refused, and a packing too large for all windows."""
-    from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.windows import LIMITS
-
-    if every and modes is not None:
-        raise BadInputError("--all goes without --modes: among some modes the first window is sought; leave one out")
-    if every and (disks := scene.packing.disks) > LIMITS.all_windows:
-        raise BadInputError(
-            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
-            "out for the first window, or take a smaller packing"
-        )
-    if modes is None:
-        return None
-    if scene.damping is not None:
-        raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
-    first, _, stop = modes.partition(":")
-    if not (first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
-        raise typer.BadParameter(
-            f"--modes {modes}: give the first mode and the first one beyond, as in --modes 0:600 for the 600 lowest"
-        )
-    return int(first), int(stop)
-
-
-def _search(
-    scene: Scene, mu: float, part: tuple[int, int] | None, first: bool, bed: Any, output: Path | None,
-    folder: Path | None, before: list[dict[str, Any]],
-) -> Onset:  # fmt: skip
-    """Search for one friction coefficient.
-
-    With dissipation the windows are written as they come, beside what is known `before`, with the load up to which they
-    are all as the key `searched_to`.
-    """
+def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None) -> Onset:
+    """Search for one friction coefficient, and say what is doubtful."""
     from faultgouge.pywrap.onset import onset_run
 
     dissipation = scene.damping is not None
-
-    def known(so_far: Onset, fx: float) -> None:
-        if output is not None:
-            _document(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
-            reached = f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path"
-            keeps(reached, output)
-
     with status(f"mu = {mu:g}") as show:
 
         def watch(now: str) -> None:
             show(f"mu = {mu:g}: {now}")
             if folder is not None and folder.is_dir():
-                keeps(f"{folder} has what was found so far; the same command continues from there", folder)
-            if dissipation and output is None:
-                keeps(f"no file was written. mu = {mu:g}: {now}")
+                keeps(f"{folder} has what was found so far; the same command continues from there")
 
-        found = onset_run(
-            scene,
-            mu,
-            dissipation=dissipation,
-            first=first,
-            modes=part,
-            known=known,
-            bed=bed,
-            watch=watch,
-            folder=folder,
-        )
+        found = onset_run(scene, mu, dissipation=dissipation, first=first, bed=bed, watch=watch, folder=folder)
     for equilibrium in found.equilibria:
         report_fallback(equilibrium)
     expected = "a motion was expected to grow" if dissipation else "a pair was expected to become complex"
@@ -175,17 +111,6 @@ def _search(
     return found
 
 
-def _document(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
-    """The JSON of the first friction coefficient with an onset, and of all, written if there is a file."""
-    from faultgouge.analysis.files.atomic_write import write_json
-
-    first = next((each for each in found if each["fx_c"] is not None), found[0])
-    result = first | ({"each_mu": found} if len(found) > 1 else {})
-    if output and is_root():
-        write_json(output, result)
-    return result
-
-
 def _in_si(scene: Scene, found: Onset) -> dict[str, list[dict[str, float]]]:
     """Loads at which windows begin, with frequencies, as the key si of a scene that has [units]; else nothing."""
     from faultgouge.pywrap.scenes.units import real_units
@@ -196,11 +121,7 @@ def _in_si(scene: Scene, found: Onset) -> dict[str, list[dict[str, float]]]:
     return {"si": [real.onset(each.fx_onset, omega[k]) for k, each in enumerate(found.windows)]}
 
 
-def _undamped_in_words(mu: float, undamped: Onset | None) -> str:
-    return f"mu = {mu:g}: without dissipation {'none on this ramp' if undamped is None else undamped.describe()}"
-
-
-def _in_words(scene: Scene, found: Onset, part: tuple[int, int] | None) -> Results:
+def _in_words(scene: Scene, found: Onset) -> Results:
     """The onset of a friction coefficient: F_x^c, how it begins, all windows as a table; in SI as well."""
     from faultgouge.analysis.uncertain_digits import with_uncertainty
 
@@ -208,16 +129,17 @@ def _in_words(scene: Scene, found: Onset, part: tuple[int, int] | None) -> Resul
     si = [[f"{number:.4g}" for number in each.values()] for each in _in_si(scene, found).get("si", [])]
     first_in_si = [f"{mu}: in SI a shear stress of {s} Pa, {r} of the overburden, at {f} Hz" for s, r, f in si[:1]]
     if opening.dissipative:
-        yield (
-            f"{mu}: unstable at F_x = {opening.fx_onset:g} in spite of the dissipation, before any shear is added: a "
-            f"motion of omega = {opening.frequency:.6g} grows"
-            if opening.kind == "start"
-            else f"{mu}: with dissipation {found.describe()} ({opening.kind}, omega = {opening.frequency:.6g})"
-        )
-        yield _undamped_in_words(found.mu, found.undamped)
+        omega = f"omega = {opening.frequency:.6g}"
+        if opening.kind == "start":
+            spite = f"{mu}: unstable at F_x = {opening.fx_onset:g} in spite of the dissipation"
+            yield f"{spite}, before any shear is added: a motion of {omega} grows"
+        else:
+            yield f"{mu}: with dissipation {found.describe()} ({opening.kind}, {omega})"
+        undamped = "none on this ramp" if found.undamped is None else found.undamped.describe()
+        yield f"{mu}: without dissipation {undamped}"
         yield from first_in_si
         return
-    yield f"{mu}: {found.describe()}{'' if part is None else f' among the modes {part[0]}:{part[1]}'}"
+    yield f"{mu}: {found.describe()}"
     if found.complete:
         headings = ["in Pa", "F_x/F_y", "in Hz"] if si else ["eigenvalue"]
         rows = []

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +11,7 @@ from typer import Argument, Option
 
 from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
-from .studies import TRIED, try_cases
+from .studies import TRIED, extremes
 from .terminal import (
     RAMPED,
     Frame,
@@ -22,6 +21,8 @@ from .terminal import (
     Time,
     command,
     locked,
+    one_of,
+    plain,
     refuse_scene,
     say,
     status,
@@ -30,7 +31,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, ElasticModuli, Packing, Spectrum, Stability, Vibrations
+    from ..analysis import Configuration, Packing, Spectrum, Stability
     from ..analysis.has_configuration import HasConfiguration
 
 MOST_PAIRS = 20
@@ -38,6 +39,14 @@ MOST_PAIRS = 20
 
 VERDICT_FIRST = 2000
 """Coordinates beyond which the eigenvalues take longer than the verdict, which does not need them."""
+
+RULES = {
+    "rayleigh": "Rayleigh's formula (Li, Xu and Thornton), of which 0.1 to 0.3 is usual",
+    "o_sullivan_bray": "0.17 sqrt(m/k) (O'Sullivan and Bray)",
+    "oscillator": "2 sqrt(m/k), one sphere on one spring",
+    "p_wave": "R sqrt(rho/E) with k = E R, a sound wave through a sphere (YADE)",
+}
+"""Rules for time steps by their keys in JSON."""
 
 Follow = Annotated[
     bool, Option("--follow", help="Where motion grows, let LAMMPS go on until it vibrates, creeps or flows.")
@@ -47,6 +56,7 @@ OF_ANY = "run.h5, NAME.disks, a LAMMPS deck; or, with --material, a table of sph
 AnyPacking = Annotated[Path, Argument(metavar="FILE", help=OF_ANY, callback=refuse_scene)]
 OF_TABLE = "Of a table: young, poisson, density, friction, restitution; or kn, kt and exponent (1.5 or 1) for young."
 MaterialOf = Annotated[str | None, Option("--material", metavar="KEY=VALUE,...", help=OF_TABLE)]
+OF_TIME = "How long motion is followed; until it has settled by default."
 
 
 @command("faultgouge examples pour && faultgouge stability pour.in --follow", as_json=True)
@@ -54,11 +64,8 @@ def stability(
     file: Annotated[
         Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a LAMMPS deck (.in).")
     ] = None,
-    rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE)] = None,
-    followed: Annotated[
-        float | None,
-        Option("--time", metavar="T", help="How long motion is followed; until it has settled by default."),
-    ] = None,
+    rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE, callback=one_of("fx"))] = None,
+    followed: Annotated[float | None, Option("--time", metavar="T", help=OF_TIME)] = None,
     follow: Follow = False,
     relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,
@@ -70,13 +77,15 @@ def stability(
     The first sentence is the verdict. A deck is run as LAMMPS runs it, and its last
     state is looked at. Without a file this is the old name of `faultgouge extremes`.
     """
+    from faultgouge.door import is_deck
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     if file is None:
-        yield from _extremes(output, quick)
+        say("faultgouge stability without a file is called faultgouge extremes now")
+        with locked(output, kind="folder"):
+            keeps(TRIED.format(output=output))
+            yield from extremes(output, quick)
         return
-    if rise not in (None, "fx"):
-        raise typer.BadParameter(f"--rise {rise}: the load rises along fx")
     if followed is not None and not 0 < followed < inf:
         raise typer.BadParameter(f"--time {followed:g}: the time that motion is followed is a positive number")
     found: list[Stability] = []
@@ -85,7 +94,7 @@ def stability(
         if is_root():
             found.append(verdict_of(packing, rise, followed, follow=going_on))
 
-    if file.suffix == ".in" or file.name.startswith("in."):
+    if is_deck(file):
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
             packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:
@@ -93,39 +102,20 @@ def stability(
     elif relax:
         raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
     else:
-        judge(follow, _with_layer(file, stored_packing(refuse_scene(file), frame), rise))
+        judge(follow, stored_packing(refuse_scene(file), frame))
     for verdict in found:
         yield str(verdict)
         yield verdict.as_dict()
 
 
-def _with_layer(file: Path, packing: HasConfiguration, rise: object) -> HasConfiguration:
-    """The packing; refused if a load is to rise and there is no layer."""
-    if rise and not packing.configuration.top.any():
-        raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
-    return packing
-
-
-def verdict_of(packing: HasConfiguration, *given: Any, **options: Any) -> Stability:
+def verdict_of(packing: HasConfiguration, rise: str | None = None, *given: Any, **options: Any) -> Stability:
     """The verdict on a packing, with progress."""
     from faultgouge import stability as stability_of
 
+    if rise and not packing.configuration.top.any():
+        raise typer.BadParameter("--rise: this packing has no upper layer that a load could push; leave it out")
     with working("stability"):
-        return stability_of(packing, *given, **options)
-
-
-def _extremes(output: Path, quick: bool) -> Results:
-    """The stiff and extreme cases under their name until version 1, with the JSON under its old name, too."""
-    from faultgouge.analysis.files.atomic_write import write_whole
-
-    say("faultgouge stability without a file is called faultgouge extremes now")
-    with locked(output, kind="folder"):
-        keeps(TRIED.format(output=output), output)
-        try:
-            yield from try_cases(output, quick)
-        finally:
-            if is_root() and (output / "extremes.json").exists():
-                write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
+        return stability_of(packing, rise, *given, **options)
 
 
 @command(f"{RAMPED} && faultgouge spectrum run.h5 --json", alone=True, as_json=True)
@@ -144,9 +134,6 @@ def spectrum(
     ] = False,
     rise: Annotated[bool, Option("--rise", help=OF_RISE)] = False,
     follow: Follow = False,
-    verbose: Annotated[
-        bool, Option("--verbose", help="Also conditions of pairs, quality factors, what makes K asymmetric.")
-    ] = False,
 ) -> Results:
     """Say whether a stored packing is stable; compute its eigenvalues, complex pairs and rattlers.
 
@@ -154,32 +141,29 @@ def spectrum(
     contacts at Coulomb's bound as they are, which slide on ahead and stick on the
     way back. The eigenvalues are those of K alone, without dissipation.
     """
-    from faultgouge.analysis import Packing, eigenvalues, solid_fraction
+    from faultgouge.analysis import eigenvalues, solid_fraction
     from faultgouge.analysis import spectrum as spectrum_of
+    from faultgouge.analysis.files.configuration_file import holds_configuration
 
-    if values and (gain or rise or verbose or follow):
-        raise typer.BadParameter(
-            "--values computes nothing but eigenvalues: leave --gain, --rise, --follow and --verbose out"
-        )
-    packing = _with_layer(file, stored_packing(file, frame, time), rise)
-    size = packing.configuration.coordinates
-    large = size > VERDICT_FIRST
+    if values and (gain or rise or follow):
+        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --follow out")
+    packing = stored_packing(file, frame, time)
+    configuration = packing.configuration
+    size = configuration.coordinates
     if values:
-        if large:  # four matrices of doubles; 18000 coordinates took 10.2 GB
-            say(f"{size} coordinates: LAPACK needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
-        found = [[value.real, value.imag] for value in eigenvalues(packing).tolist()]
+        found = plain(eigenvalues(packing))
         yield from (f"{real:.17g} {imaginary:.17g}" for real, imaginary in found)
         yield {"eigenvalues": found, "rattlers": packing.rattlers.tolist(), "fx": packing.fx}
         return
-    result = None if large else spectrum_of(packing)
+    result = None if size > VERDICT_FIRST else spectrum_of(packing)
     verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
     yield str(verdict)
     if result is None:
         with working("eigenvalues of K"):
             result = spectrum_of(packing)
-    gains, configuration = _gain_of(packing) if gain else None, packing.configuration
-    fraction = solid_fraction(packing) if isinstance(packing, Packing) else None
-    yield from _spectrum_in_words(packing, result, verdict.dissipative, verbose, fraction)
+    gains = _gain_of(packing) if gain else None
+    fraction = None if holds_configuration(file) else solid_fraction(packing)
+    yield from _spectrum_in_words(packing, result, verdict.dissipative, fraction)
     if gains is not None:
         yield (
             f"a displacement from rest grows by up to {gains['displacement']:.6g} times in its square, within t = "
@@ -189,22 +173,13 @@ def spectrum(
         )
         if not gains["linear"]:
             yield "this is the gain of K alone, in which each contact has one derivative; these contacts have two"
-    if verbose:
-        shares = ", ".join(f"{name.replace('_', ' ')} {share:.3g}" for name, share in verdict.asymmetry.items())
-        yield f"what makes K asymmetric, as shares: {shares}"
-        if result.noise_pairs:
-            pairs = counted(result.noise_pairs, "pair")
-            yield f"{pairs} of eigenvalues with imaginary parts within the rounding error: they count as real"
     if spring := configuration.spring:
         yield f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks"
-    of_pair = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
+    of_pair = ("eigenvalue", "condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
     yield {
         "stability": verdict.as_dict(),
-        "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
-        "pairs": [
-            {"eigenvalue": [each.eigenvalue.real, each.eigenvalue.imag]} | {key: getattr(each, key) for key in of_pair}
-            for each in result.pairs
-        ],
+        "eigenvalues": plain(result.eigenvalues),
+        "pairs": [{key: plain(getattr(each, key)) for key in of_pair} for each in result.pairs],
         "pair_count": len(result.pairs),
         "least_q": result.least_q if result.pairs else None,
         "negative": result.negative.tolist(),
@@ -221,7 +196,7 @@ def spectrum(
 
 
 def _spectrum_in_words(
-    packing: HasConfiguration, result: Spectrum, dissipative: bool, verbose: bool, fraction: float | None
+    packing: HasConfiguration, result: Spectrum, dissipative: bool, fraction: float | None
 ) -> Results:
     """The packing, the range of its eigenvalues, and those with which motions grow."""
     from faultgouge.analysis import growth_rate
@@ -240,21 +215,17 @@ def _spectrum_in_words(
     for value in result.negative:
         yield f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t){alone}, no oscillation"
     for pair in result.pairs[:MOST_PAIRS]:
-        condition = f", |y^H x| = {pair.overlap:.2g}" if verbose else ""
         numbers = f"{pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i"
-        yield f"complex pair {numbers}: D grows as exp({pair.growth_rate:.6g} t){alone}{condition}"
+        yield f"complex pair {numbers}: D grows as exp({pair.growth_rate:.6g} t){alone}"
     if len(result.pairs) > MOST_PAIRS:
         yield f"and {len(result.pairs) - MOST_PAIRS} more: --json has all {len(result.pairs)}"
-    if result.pairs and verbose:
-        yield f"least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
 
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
-    """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
+    """The transient gains of a stable packing; None, with the reason, if it is unstable or too large."""
     from faultgouge.analysis.responses.transient import GAIN_DISKS, NoGainError, transient_gains
 
-    most, size = 3 * GAIN_DISKS, packing.configuration.coordinates
-    if size > most:
+    if (size := packing.configuration.coordinates) > (most := 3 * GAIN_DISKS):
         say(f"no gain: it is computed of up to {most} coordinates, and this packing has {size}")
         return None
     try:
@@ -262,15 +233,9 @@ def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     except NoGainError as error:
         say(f"no gain: {error}")
         return None
-    except Exception as error:  # whatever it is: the eigenvalues are worth more
-        reason = (str(error).splitlines() or ["no reason given"])[0]
-        say(f"the transient gain was not found ({type(error).__name__}: {reason}); the eigenvalues are complete")
-        return None
-    names = ("time", "window", "bound", "disk", "linear")
-    gains = {"displacement": displacement.gain, "energy": energy.gain} | {
-        key: getattr(displacement, key) for key in names
-    }
-    return gains | {"direction": displacement.direction.tolist()}
+    names = ("time", "window", "bound", "disk", "linear", "direction")
+    gains = {"displacement": displacement.gain, "energy": energy.gain}
+    return gains | {key: plain(getattr(displacement, key)) for key in names}
 
 
 @command("faultgouge examples disks && faultgouge timestep disks.csv --material young=1e9,density=1100", as_json=True)
@@ -288,17 +253,9 @@ def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -
     error = f" (at most {step.error:.2g} shorter)" if step.error else ""
     yield f"{configuration!r}".removeprefix("<Configuration: ").removesuffix(">")
     yield f"largest stable time step {step:.6g}{error}; all steps up to {step.certain:.6g} are stable for certain"
-    names = {
-        "rayleigh": "Rayleigh's formula (Li, Xu and Thornton), of which 0.1 to 0.3 is usual",
-        "o_sullivan_bray": "0.17 sqrt(m/k) (O'Sullivan and Bray)",
-        "oscillator": "2 sqrt(m/k), one sphere on one spring",
-        "p_wave": "R sqrt(rho/E) with k = E R, a sound wave through a sphere (YADE)",
-    }
     for name, value in rules.items():
-        share = (
-            "does not apply to these contacts" if value is None else f"{value:.6g}, {value / step:.3g} of the largest"
-        )
-        yield f"  {names[name]}: {share}"
+        applies = "does not apply to these contacts"
+        yield f"  {RULES[name]}: {applies if value is None else f'{value:.6g}, {value / step:.3g} of the largest'}"
     document = {"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules}
     # infinite where nothing touches: JSON has no such number
     yield {key: None if value == inf else value for key, value in document.items()}
@@ -310,7 +267,9 @@ def vibrations(
     output: NewFolder = Path("vibrations"),
     material: MaterialOf = None,
     frame: Frame = -1,
-    along: Annotated[str, Option(metavar="x|y|z", help="Edge of the box along which plane waves run.")] = "x",
+    along: Annotated[
+        str, Option(metavar="x|y|z", help="Edge of the box along which plane waves run.", callback=one_of(*"xyz"))
+    ] = "x",
     waves: Annotated[int, Option(min=0, help="Plane waves, from the one as long as the box.")] = 4,
 ) -> Results:
     """Compute how a packing vibrates: density of states, modes, softness, plane waves, elastic moduli.
@@ -320,14 +279,12 @@ def vibrations(
     """
     from faultgouge.analysis import BadInputError, dispersion, elastic_moduli, softness
     from faultgouge.analysis import vibrations as vibrations_of
-    from faultgouge.analysis.files.atomic_write import write_whole
+    from faultgouge.analysis.files.atomic_write import write_json, write_text
     from faultgouge.analysis.files.formats import write_packing
     from faultgouge.figures import save
     from faultgouge.figures.series import draw_vibrations, draw_waves
     from faultgouge.figures.style import report_failure
 
-    if along not in ("x", "y", "z"):
-        raise typer.BadParameter(f"--along {along}: give x, y or z")
     packing = _any_packing(file, frame, material)
     with working(f"{file}: vibrations"):
         found = vibrations_of(packing)
@@ -338,12 +295,21 @@ def vibrations(
             moduli = elastic_moduli(packing)
         except BadInputError as reason:
             say(f"{reason}")
-        tables, document = _tables(found, plane, moduli)
-        document |= {"softness": _plain(soft), "softness_error": _plain(error)}
-        write_whole(output / "vibrations.json", (json.dumps(document, indent=1) + "\n").encode())
+        names: tuple[str, ...] = ("frequency", "resolution", "density", "density_error", "rotation", "damping")
+        tables: dict[str, Any] = {"density": {name: getattr(found, name) for name in names}, "modes": found.modes}
+        document: dict[str, Any] = {name: getattr(found, name) for name in ("largest", "counted", "zero", "negative")}
+        document |= {**tables, "waves": [wave._asdict() for wave in plane], "softness": soft, "softness_error": error}
+        names = ("young", "poisson", "shear", "bulk", "anisotropy", "density", "at_bound", "box")
+        names += ("tensor", "antisymmetric", "wave_speeds")
+        document["moduli"] = moduli and {name: getattr(moduli, name) for name in names}
+        write_json(output / "vibrations.json", plain(document))
+        if plane:
+            tables["waves"] = {name: [getattr(wave, name) for wave in plane] for name in plane[0]._fields}
         for name, columns in tables.items():
-            rows = [",".join(map(repr, map(float, row))) for row in zip(*columns.values(), strict=True)]
-            write_whole(output / f"{name}.csv", "\n".join([",".join(columns), *rows, ""]).encode())
+            rows = [",".join(map(repr, map(float, row))) for row in zip(*(columns or {}).values(), strict=True)]
+            if rows:
+                head = ",".join(columns)
+                write_text(output / f"{name}.csv", "\n".join([head, *rows, ""]), head)
         for suffix in (".xyz", ".vtp"):
             write_packing(output / f"softness{suffix}", packing, values={"softness": soft})
         with report_failure("density", say):
@@ -358,34 +324,6 @@ def vibrations(
     )
     if moduli is not None:
         yield repr(moduli).strip("<>")
-
-
-def _tables(
-    found: Vibrations, plane: list[Any], moduli: ElasticModuli | None
-) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
-    """The tables of numbers by name, with their columns; and what vibrations.json has of them and beside them."""
-    names = ("frequency", "resolution", "density", "density_error", "rotation", "damping")
-    tables: dict[str, dict[str, Any]] = {"density": {name: getattr(found, name) for name in names}}
-    if found.modes is not None:
-        tables["modes"] = found.modes
-    document: dict[str, Any] = {
-        name: {key: _plain(each) for key, each in table.items()} for name, table in tables.items()
-    }
-    document.setdefault("modes", None)
-    document |= {name: getattr(found, name) for name in ("largest", "counted", "zero", "negative")}
-    document["waves"] = [wave._asdict() for wave in plane]
-    if plane:
-        tables["waves"] = {name: [getattr(wave, name) for wave in plane] for name in plane[0]._fields}
-    numbers = ("young", "poisson", "shear", "bulk", "anisotropy", "density", "at_bound", "box")
-    arrays = ("tensor", "antisymmetric", "wave_speeds")
-    document["moduli"] = moduli and {name: getattr(moduli, name) for name in numbers} | {
-        name: getattr(moduli, name).tolist() for name in arrays
-    }
-    return tables, document
-
-
-def _plain(values: Any) -> list[float | None]:
-    return [each if isfinite(each) else None for each in values.tolist()]
 
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +20,7 @@ from .terminal import (
     Time,
     command,
     locked,
+    one_of,
     print_line,
     progress,
     refuse_scene,
@@ -39,24 +39,14 @@ if TYPE_CHECKING:
     from ..analysis.has_configuration import HasConfiguration
 
 
-class Colour(str, Enum):
-    """Quantity that the colour of a contact shows."""
-
-    MOBILISED = "mobilised"
-    SLIP = "slip"
-    FORCE = "force"
-    NONE = "none"
-
-
 OF_MODE = (
     "The unstable pair, or before the onset the two modes closest to merging; or mode N, counted by eigenvalue from 0."
 )
 OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
 OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
-WhichColour = Annotated[
-    Colour, Option(help="Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none.")
-]
+OF_COLOUR = "Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none."
+WhichColour = Annotated[str, Option(help=OF_COLOUR, callback=one_of("mobilised", "slip", "force", "none"))]
 
 
 def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:
@@ -76,7 +66,7 @@ def draw(
     ] = None,
     time: Time = None,
     mode: WhichMode = None,
-    color: WhichColour = Colour.MOBILISED,
+    color: WhichColour = "mobilised",
     output: Annotated[Path, Option("-o", "--output", help="The picture: .png, .svg or .pdf.")] = Path("picture.png"),
 ) -> Results:
     """Draw a stored packing with its force chains or a mode, a cycle of loads, D(t) of perturb.h5, F(t) of drive.h5.
@@ -89,7 +79,7 @@ def draw(
     drive.h5 as the force over time with its slips. With --frame, --time or --mode, the
     packing of these files is drawn instead.
     """
-    from faultgouge.analysis import Packing
+    from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.figures import draw_packing
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
@@ -104,11 +94,11 @@ def draw(
         load = f"F_x = {packing.fx:g}: " if packing.top.any() else ""
         yield "\n".join([f"{load}{what}", *(each.plain for each in modes)])
         figure = draw_modes(packing, modes, what)
-    elif isinstance(packing, Packing) and frame is None and time is None and file.suffix != ".disks":
+    elif frame is time is None and file.suffix != ".disks" and not holds_configuration(file):
         figure = _picture_of_run(file)
     if figure is None:
         yield in_words(packing)
-        figure = draw_packing(packing, color=color.value, caption=True)
+        figure = draw_packing(packing, color=color, caption=True)
     save_as(figure, output)
     yield f"written to {output}"
 
@@ -138,7 +128,7 @@ def movie(
     file: PackingFile,
     mode: WhichMode = None,
     frame: Frame = -1,
-    color: WhichColour = Colour.MOBILISED,
+    color: WhichColour = "mobilised",
     seconds: Annotated[float, Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
     rate: Annotated[float, Option(min=1, max=60, help="Frames per second.")] = 10.0,
     span: Annotated[
@@ -175,7 +165,7 @@ def movie(
     check_name(output)
     with locked(output, file):
         if packing is None:
-            film = _film_of_file(file, count, color.value, span, dots)
+            film = _film_of_file(file, count, color, span, dots)
         else:
             film = film_of_modes(packing, *modes_of(packing, str(mode)), count, periods=periods, dots=dots)
         write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
@@ -228,8 +218,6 @@ def view(
     """
     from faultgouge.door import view as write_page
 
-    if output.suffix.lower() != ".html":
-        raise typer.BadParameter(f"-o {output}: a page is an .html")
     counts: list[int] = []
 
     def shown(packings: Sequence[Any]) -> Iterable[Any]:

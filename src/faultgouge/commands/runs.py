@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import asdict
 from math import ceil
@@ -20,12 +21,9 @@ if TYPE_CHECKING:
     from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
 
-MOST_LOOSE = 0.1
-"""Share of the disks above the upper layer from which the command says so: of 20 seeds of 40 disks two have more."""
-
-SLIP_COLUMNS = (
+SLIP_COLUMNS = [
     "begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after",
-)  # fmt: skip
+]  # fmt: skip
 """Columns of the table of slips."""
 
 
@@ -51,14 +49,11 @@ def examples(
 
     scenes = files("faultgouge") / "scenes"
     shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
-
-    def head(text: str) -> list[str]:
-        """What an example shows, and the command that runs the example: its first two lines."""
-        return [line.strip('# "') for line in text.splitlines()[:2]]
-
+    # what an example shows, and the command that runs it: its first two lines
+    heads = {key: [line.strip('# "') for line in each.read_text().splitlines()[:2]] for key, each in shelf.items()}
     if name is None:
         for key in sorted(shelf):
-            yield "{:9} {}\n{:9} {}".format(key, (lines := head(shelf[key].read_text()))[0], "", lines[1])
+            yield "{:9} {}\n{:9} {}".format(key, heads[key][0], "", heads[key][1])
         yield "\nfaultgouge examples NAME copies one into this folder."
         return
     # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
@@ -70,22 +65,39 @@ def examples(
         if Path(each.name).exists():
             raise typer.BadParameter(f"{each.name} exists in this folder: move it away, or use another folder")
         Path(each.name).write_bytes(each.read_bytes())
-    yield "{}: {}\nnext: {}".format(chosen.name, *head(text))
+    yield "{}: {}\nnext: {}".format(chosen.name, *(line.strip('# "') for line in text.splitlines()[:2]))
 
 
-@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", writes="run")
+@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", writes="run")
 def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    with Record(output, scene, saved=keeps) as record:
+    with Record(output, scene, saved=_keeps) as record:
         last = _settle_or_read(scene, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     yield f"{last}; written to {output}"
 
 
-@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", writes="run", as_json=True)
+def _keeps(words: str, path: Path) -> None:
+    keeps(words)
+
+
+def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
+    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
+    from faultgouge.pywrap import settle
+
+    if record.remark:
+        say(record.remark)
+    if record.last is None:
+        with status("settling") as show:
+            record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
+        assert record.last is not None
+    return record.last
+
+
+@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", writes="run", as_json=True)
 def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
@@ -102,7 +114,7 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
 
     assert scene.ramp is not None
     loads = all_loads(scene.ramp)
-    with Record(output, scene, saved=keeps) as record:
+    with Record(output, scene, saved=_keeps) as record:
         start = _settle_or_read(scene, record)
         done = count_behind(scene.ramp, record.forces)
         dumps = output.with_suffix("") if scene.output is not None and scene.output.dumps else None
@@ -110,62 +122,33 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
             report_fallback(equilibrium)
             record.append(equilibrium)
         record.finish()
-    assert record.last is not None
     if not is_root():
         return
     with RunFile(output) as file:
         columns = {name: file.observable(name).tolist() for name in ("fx", "residual", "floor", "evaluations")}
-        count, ways, turns = len(file), fallbacks(file), len(scene.ramp.turning_points) > 1
-        rows = [
-            {name: column[k] for name, column in columns.items()}
-            | {"contacts": len(file.packing(k).contacts), "way": ways.get(k)}
-            for k in range(count)
-        ]
-        left = hysteresis([file.packing(k) for k in range(count)]) if turns else None
-    fx, residual = record.last.fx, record.last.residual
+        columns["contacts"] = [len(file.packing(k).contacts) for k in range(len(file))]
+        columns["way"] = [*map(fallbacks(file).get, range(len(file)))]
+        turns = len(scene.ramp.turning_points) > 1
+        left = hysteresis([file.packing(k) for k in range(len(file))]) if turns else None
+    fx = columns["fx"][-1]
     if fx != loads[-1]:
         beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {fx:g}"
         yield f"{beyond}: nothing is left to compute"
     else:
-        yield f"F_x = {fx:g} reached; residual force {residual:.2g}; written to {output}"
-    if left is not None and left.closes:
-        yield f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
-    elif left is not None:
-        yield (
-            f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
-            f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
+        yield f"F_x = {fx:g} reached; residual force {columns['residual'][-1]:.2g}; written to {output}"
+    if left is not None:
+        yield f"F_x is back at {left.fx:g}" + (
+            ", and so is the upper layer: the path closes, to rounding"
+            if left.closes
+            else f": since F_x first had this value, the upper layer has moved by {left.remaining:.4g}, and the work "
+            f"of the loads is {left.work:.4g}"
         )
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     yield {"equilibria": rows, "hysteresis": None if left is None else asdict(left)}
 
 
-def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
-    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
-    from faultgouge.pywrap import settle
-
-    if record.remark:
-        say(record.remark)
-    if record.last is None:
-        with status("settling") as show:
-            record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
-        assert record.last is not None
-        packing = record.last.packing
-        height = packing.position[:, 1]
-        loose = int((height[packing.rattlers] > height[packing.top].mean()).sum()) if packing.top.any() else 0
-        if loose > MOST_LOOSE * len(packing):  # the layer went through them while the packing settled
-            say(
-                f"{loose} of {len(packing)} disks lie above the upper layer, where no force acts on them: another "
-                "packing.seed, or more disks in the layer (packing.top), leaves fewer there"
-            )
-    assert record.last is not None
-    return record.last
-
-
 @command(
-    "faultgouge examples eruption && faultgouge perturb eruption.toml",
-    reads="perturb",
-    task="perturb",
-    writes="run",
-    as_json=True,
+    "faultgouge examples eruption && faultgouge perturb eruption.toml", reads="perturb", writes="run", as_json=True
 )
 def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
@@ -186,7 +169,7 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     assert settings is not None
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
-    with Record(output, scene, task="perturb", saved=keeps) as record:
+    with Record(output, scene, task="perturb", saved=_keeps) as record:
         if record.remark:
             say(record.remark)
         if (start := record.last) is None:
@@ -207,26 +190,25 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
                 why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
             weakening = weakening_of(scene.friction, float(threshold))
             say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")
-        samples = [*progress(record.undamped(scene, start, weakening=weakening), "samples", lines)]
+        for _ in progress(record.undamped(scene, start, weakening=weakening), "samples", lines):
+            pass
         record.finish()
     if not is_root():
         return
     with RunFile(output) as file:
-        growth, series, packing = growth_in(file), file.series("undamped"), file.packing()
+        growth, fx = growth_in(file), file.packing().fx
+        columns = {name: column.tolist() for name, column in file.series("undamped").items()}
     assert growth is not None
-    last, largest = samples[-1], max(sample.msd for sample in samples)
-    yield f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
+    moved = f"D = {columns['msd'][-1]:.3g} after t = {columns['time'][-1]:g}, at most {max(columns['msd']):.3g}"
+    yield f"F_x = {fx:g}, mu = {mus[0]:g}: {moved}"
     yield growth.says
-    columns = {name: column.tolist() for name, column in series.items()}
-    yield {"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns
+    yield {"mu": mus[0], "fx": fx} | growth.as_dict() | columns
     yield f"written to {output}"
 
 
 def growth_in(file: RunFile) -> GrowthOfRun | None:
     """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run;
     None of another file, or where the run has not begun."""
-    import json
-
     from faultgouge.analysis.responses.growth_of_run import growth_of_run
     from faultgouge.pywrap.runs.undamped import time_step
 
@@ -240,10 +222,7 @@ def growth_in(file: RunFile) -> GrowthOfRun | None:
     return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
 
 
-@command(
-    "faultgouge examples drive && faultgouge drive drive.toml -o drive.h5",
-    reads="drive", task="settle", writes="run", as_json=True,
-)  # fmt: skip
+@command("faultgouge examples drive && faultgouge drive drive.toml", reads="drive", writes="run", as_json=True)
 def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
     """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
 
@@ -253,18 +232,15 @@ def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
     intervals and at both ends of each slip, which spectrum and draw take by --frame.
     The slips are also written as a table beside the file, with the suffix .csv.
     """
-    import numpy as np
+    from faultgouge.analysis import OutputError
+    from faultgouge.analysis.files.atomic_write import check_output
+    from faultgouge.pywrap.runs.drive import NOISES
 
-    from faultgouge.analysis import OutputError, RunFile
-    from faultgouge.analysis.files.atomic_write import check_output, write_text
-    from faultgouge.analysis.responses.slips import friction_of
-    from faultgouge.pywrap.runs.drive import NOISES, SERIES, advance_error, all_slips_in, clock_advance, strays
-
-    settings, table, head = scene.drive, output.with_suffix(".csv"), ",".join(SLIP_COLUMNS)
+    settings, table = scene.drive, output.with_suffix(".csv")
     assert settings is not None
     if table == output:
         raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
-    check_output(table, output, head=head)
+    check_output(table, output, head=",".join(SLIP_COLUMNS))
     others: dict[Path, Scene] = {}
     if settings.signal is not None:  # runs without the signal, and with signals as small as noise
         noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
@@ -275,61 +251,9 @@ def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
     start = _drive(output, scene, "driving", others=others)
     for path, other in others.items():
         _drive(path, other, f"driving {path.name}", start)
-    if not is_root():
-        return
-    with RunFile(output) as file:
-        (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
-        out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
-    rows = [
-        asdict(slip)
-        | {
-            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
-            "frame_after": int(np.searchsorted(times, slip.ends)),
-        }
-        for slip in slips
-    ]
-    friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
-    result = {
-        "slips": rows,
-        "under_way": None if under_way is None else asdict(under_way),
-        "cycles": max(0, len(slips) - 1),
-        "friction": asdict(friction),
-        "time": float(series["time"][-1]),
-        "states": len(times),
-        "strays": out,
-    }
-    write_text(table, "\n".join([head, *(",".join(repr(row[key]) for key in SLIP_COLUMNS) for row in rows), ""]), head)
-    if out:
-        say(
-            "squeezed out of the bed, above the layer, where no force acts: disks "
-            f"{', '.join(map(str, out))}; they were stopped there"
-        )
-    time, mean = f"t = {result['time']:.4g}", f"F/F_y is {friction.mean:.3g} on average"
-    unended = "" if under_way is None else (
-        f": a slip that began at t = {under_way.begins:.4g} is under way, F has fallen from "
-        f"{under_way.force_before:.4g} to {under_way.force_after:.4g}"
-    )  # fmt: skip
-    if slips:
-        headings = [key.replace("force", "F").replace("_", " ") for key in SLIP_COLUMNS]
-        yield table_of(headings, [[f"{row[key]:.4g}" for key in SLIP_COLUMNS] for row in rows])
-        apart = (slips[-1].begins - slips[0].begins) / max(1, len(slips) - 1)
-        recurrence = f", one in {apart:.4g} units of time" if len(slips) > 1 else ""
-        yield (
-            f"{counted(len(slips), 'slip')} up to {time}{recurrence}; {mean} from the first slip on, "
-            f"{friction.before:.3g} before slips, {friction.after:.3g} after them{unended}"
-        )
-    else:
-        why = ", of a rigid drive, which counts no slips" if settings.spring == "rigid" else unended or ": no slip"
-        yield f"{time}{why}; {mean}, at most {friction.largest:.3g}"
-    if others:
-        without, *noisy = others
-        noise = [clock_advance(path, without) for path in noisy]
-        result["clock_advance"] = advance = clock_advance(output, without)
-        result["clock_advance_error"] = error = advance_error(noise, float(series["time"][1] - series["time"][0]))
-        result["clock_advances_of_noise"] = noise
-        yield _advance_in_words(advance, error, len(noise))
-    yield result
-    yield f"written to {', '.join(map(str, [output, *others]))} and {table}"
+    if is_root():
+        yield from _slips(scene, output, table, [*others])
+        yield f"written to {', '.join(map(str, [output, *others]))} and {table}"
 
 
 def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, others: Any = None) -> Packing:
@@ -340,7 +264,7 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
     from faultgouge.pywrap import Equilibrium
     from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
 
-    with DriveRecord(output, scene, saved=keeps) as record:
+    with DriveRecord(output, scene, saved=_keeps) as record:
         if record.remark:
             say(record.remark)
         if record.last is None:
@@ -360,12 +284,71 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
         return record.last.packing
 
 
-def _advance_in_words(advance: float | None, error: float | None, runs: int) -> str:
-    if advance is None:
-        return "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
-    side = "earlier" if advance >= 0 else "later"
-    earlier = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
-    if error is None:
-        return f"{earlier}; with noise none follows in the run"
-    alone = ", which noise alone may do" if abs(advance) <= error else ""
-    return f"{earlier}, \u00b1 {error:.2g} (95 %, of {runs} runs with noise of 1e-12){alone}"
+def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Results:
+    """The slips of a drive as a table, their friction, and the advance of the next slip by a signal; as JSON, too."""
+    import numpy as np
+
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.responses.slips import friction_of
+    from faultgouge.pywrap.runs.drive import SERIES, advance_error, all_slips_in, clock_advance, strays
+    from faultgouge.studies.result_rows import write_csv
+
+    assert scene.drive is not None
+    with RunFile(output) as file:
+        (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
+        out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
+    rows = [
+        asdict(slip)
+        | {
+            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
+            "frame_after": int(np.searchsorted(times, slip.ends)),
+        }
+        for slip in slips
+    ]
+    write_csv(table, SLIP_COLUMNS, rows)
+    friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
+    result = {
+        "slips": rows,
+        "under_way": None if under_way is None else asdict(under_way),
+        "cycles": max(0, len(slips) - 1),
+        "friction": asdict(friction),
+        "time": float(series["time"][-1]),
+        "states": len(times),
+        "strays": out,
+    }
+    if out:
+        squeezed = "squeezed out of the bed, above the layer, where no force acts: disks"
+        say(f"{squeezed} {', '.join(map(str, out))}; they were stopped there")
+    time, mean, unended = f"t = {result['time']:.4g}", f"F/F_y is {friction.mean:.3g} on average", ""
+    if under_way is not None:
+        unended = f": a slip that began at t = {under_way.begins:.4g} is under way, F has fallen from "
+        unended += f"{under_way.force_before:.4g} to {under_way.force_after:.4g}"
+    if slips:
+        headings = [key.replace("force", "F").replace("_", " ") for key in SLIP_COLUMNS]
+        yield table_of(headings, [[f"{row[key]:.4g}" for key in SLIP_COLUMNS] for row in rows])
+        apart = (slips[-1].begins - slips[0].begins) / max(1, len(slips) - 1)
+        recurrence = f", one in {apart:.4g} units of time" if len(slips) > 1 else ""
+        yield (
+            f"{counted(len(slips), 'slip')} up to {time}{recurrence}; {mean} from the first slip on, "
+            f"{friction.before:.3g} before slips, {friction.after:.3g} after them{unended}"
+        )
+    else:
+        why = ", of a rigid drive, which counts no slips" if scene.drive.spring == "rigid" else unended or ": no slip"
+        yield f"{time}{why}; {mean}, at most {friction.largest:.3g}"
+    if others:
+        without, *noisy = others
+        noise = [clock_advance(path, without) for path in noisy]
+        advance = clock_advance(output, without)
+        error = advance_error(noise, float(series["time"][1] - series["time"][0]))
+        result |= {"clock_advance": advance, "clock_advance_error": error, "clock_advances_of_noise": noise}
+        if advance is None:
+            why = "no slip follows the signal, with or without it; let the run be longer"
+            yield f"clock advance: not known, since {why}"
+        else:
+            side = "earlier" if advance >= 0 else "later"
+            within = "; with noise none follows in the run"
+            if error is not None:
+                alone = ", which noise alone may do" if abs(advance) <= error else ""
+                within = f", \u00b1 {error:.2g} (95 %, of {len(noise)} runs with noise of 1e-12){alone}"
+            yield f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal{within}"
+    yield result

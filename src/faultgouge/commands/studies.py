@@ -37,10 +37,9 @@ if TYPE_CHECKING:
     from faultgouge.studies.sweep.sweep_plan import Sweep
 
 REPLACED = "; the same command starts from the beginning and replaces them"
+TRIED = "{output} has the cases that were finished" + REPLACED
 OF_SHARD = "Only part K of N, for job arrays; each part needs its own folder."
-OF_DRY_RUN = "Print the remaining work, and how long it takes by the rows that are there."
 Shard = Annotated[str, Option(metavar="K/N", help=OF_SHARD)]
-DryRun = Annotated[bool, Option("--dry-run", help=OF_DRY_RUN)]
 
 
 def study_command(name: str) -> CommandInfo | None:
@@ -48,57 +47,49 @@ def study_command(name: str) -> CommandInfo | None:
     about = registered.description(name)
     if about is None or not about.given.get("example"):
         return None
-    example, of_run = about.given["example"], "of_run" in about.given
+    example, made = about.given["example"], dict[str, Any]()
     if about.kind == "study":
         words = about.given.get("kept", "what was found so far")
         kept = f"{{output}}/{name}.jsonl has {words}; the same command continues from there"
+        made = {"reads": name, "writes": "folder", "kept": kept, "as_json": True}
 
-        def study(scene: SceneFile, output: Folder = Path(name)) -> Results:
-            run = registered.study_of(name)
-            yield run(scene, output, say, lambda rows, count: progress(rows, run.counts, count))
-            yield f"written: {output}/{name}.{'md' if run.page else 'json'}"
+        def run(scene: SceneFile, output: Folder = Path(name)) -> Results:
+            study = registered.study_of(name)
+            yield study(scene, output, say, lambda rows, count: progress(rows, study.counts, count))
+            yield f"written: {output}/{name}.{'md' if study.page else 'json'}"
+    else:
+        of_run = "of_run" in about.given
+        metavar = "SCENE|SWEEP|drive.h5" if of_run else "SCENE|SWEEP"
+        help_ = f"A scene, a sweep of the task {name}, or a run of `drive`." if of_run else "A scene, or a sweep of it."
 
-        study.__doc__ = about.says
-        command(example, name=name, reads=name, writes="folder", kept=kept, as_json=True)(study)
-        return COMMANDS.pop(name)
-    argument = f"a sweep of the task {name}"
-    of_task = Argument(
-        metavar="SCENE|SWEEP|drive.h5" if of_run else "SCENE|SWEEP",
-        help=f"A scene, {argument}, or a run of `drive`." if of_run else f"A scene, or {argument}.",
-    )
-
-    def task(
-        file: Annotated[Path, of_task],
-        output: Folder = Path(name),
-        shard: Shard = "1/1",
-        workers: Workers = None,
-        dry_run: DryRun = False,
-    ) -> Results:
-        if file.suffix == ".h5" and (run := registered.study_of(name).of_run) is not None:
-            keeps(f"{output} has the states so far; the same command continues from there", output)
-            if is_root():
+        def run(  # type: ignore[misc]
+            file: Path, output: Folder = Path(name), shard: Shard = "1/1", workers: Workers = None
+        ) -> Results:
+            if not (of_run and file.suffix == ".h5"):
+                yield from _run_task(name, file, output, shard, workers)
+            elif is_root():
+                keeps(f"{output} has the states so far; the same command continues from there")
                 with locked(output, kind="folder"):
-                    yield from run(file, output, say, lambda rows, count: progress(rows, "states", count))
-            return
-        yield from _run_task(name, file, output, shard, workers, dry_run)
+                    study = registered.study_of(name)
+                    yield from study.of_run(file, output, say, lambda rows, count: progress(rows, "states", count))
 
-    task.__doc__ = about.says
-    task.__annotations__["file"] = Annotated[Path, of_task]
-    command(example, name=name)(task)
+        run.__annotations__["file"] = Annotated[Path, Argument(metavar=metavar, help=help_)]
+    run.__doc__ = about.says
+    command(example, name=name, **made)(run)
     return COMMANDS.pop(name)
 
 
-@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle", as_json=True)
+@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", as_json=True)
 def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
-    The command sets the run of the scene up in LAMMPS, takes no step, and compares
-    what LAMMPS has loaded with and without each part.
+    The command sets the run of the scene up in LAMMPS, takes no step, and says
+    which parts LAMMPS has loaded.
     """
     from faultgouge.assessment.explain import explain as explain_scene
     from faultgouge.assessment.explain import in_words
 
-    with status("setting up the run with and without each part"):
+    with status("setting up the run"):
         found = explain_scene(scene)
     yield from in_words(found)
     yield found
@@ -123,7 +114,7 @@ def reproduce(
     from importlib.resources import files
 
     shipped = Path(str(files("faultgouge") / "scenes"))
-    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
@@ -140,14 +131,11 @@ def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Results:
-    """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
+    """Measure error against run time: which method to use when, for four tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     yield f"written: {output}/report.md"
-
-
-TRIED = "{output} has the cases that were finished" + REPLACED
 
 
 @command("mpiexec -n 2 faultgouge extremes -o extremes", kept=TRIED, writes="folder", as_json=True)
@@ -156,11 +144,6 @@ def extremes(
     quick: Annotated[bool, Option("--quick", help="About half of the cases, in a few seconds.")] = False,
 ) -> Results:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    yield from try_cases(output, quick)
-
-
-def try_cases(output: Path, quick: bool) -> Results:
-    """What `extremes` does in a folder."""
     from faultgouge.assessment.extremes.run import check
     from faultgouge.assessment.extremes.run import extremes as try_all
 
@@ -182,7 +165,6 @@ def sweep(
     output: Folder = Path("sweep"),
     shard: Shard = "1/1",
     workers: Workers = None,
-    dry_run: DryRun = False,
 ) -> Results:
     """Run one task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
 
@@ -196,21 +178,15 @@ def sweep(
     possibly on several machines, one rank distributes the work: mpiexec -n 5 keeps 4
     cores busy.
     """
-    yield from _run_task(None, file, output, shard, workers, dry_run)
+    yield from _run_task(None, file, output, shard, workers)
 
 
-def _run_task(task: str | None, file: Path, output: Path, shard: str, workers: int | None, dry_run: bool) -> Results:
+def _run_task(task: str | None, file: Path, output: Path, shard: str, workers: int | None) -> Results:
     """Run a sweep, or a scene or a sweep by the command of one task, and tell what there is to say of all rows."""
     from faultgouge.analysis.files.atomic_write import check_own
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.run_sweep import (
-        missing_points,
-        read_results,
-        remaining_work,
-        require_result,
-        run_sweep,
-    )
-    from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings, points_of
+    from faultgouge.studies.sweep.run_sweep import require_result, run_sweep
+    from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings
 
     wanted = Sweep.from_toml(file) if task is None else Sweep.of_task(file, task)
     part, of = (text.isdecimal() and int(text) for text in shard.partition("/")[::2])
@@ -218,13 +194,9 @@ def _run_task(task: str | None, file: Path, output: Path, shard: str, workers: i
         raise typer.BadParameter(f"--shard {shard}: give the part and the number of parts, as in --shard 1/3")
     if is_root() and (sentence := other_packings(wanted)):
         say(sentence)
-    if dry_run:
-        known = read_results(output / "results.jsonl") if is_root() else {}
-        yield from remaining_work(missing_points(points_of(wanted.points, (part, of)), known), known.values())
-        return
     for name, head in getattr(registered.study_of(wanted.task), "writes", {}).items():
         check_own(output / name, head)
-    keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there", output)
+    keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there")
     rows = run_sweep(wanted, output, (part, of), say, lambda rows, count: progress(rows, "scenes", count), workers)
     if not is_root():
         return

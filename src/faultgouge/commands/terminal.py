@@ -12,7 +12,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext
 from functools import wraps
 from math import isfinite
 from pathlib import Path
@@ -23,7 +23,6 @@ import typer
 from typer import Argument, Option
 from typer.models import CommandInfo
 
-from ..analysis.counted import counted
 from ..signal_guard import holds, is_root, keeps
 
 if TYPE_CHECKING:
@@ -70,6 +69,17 @@ def refuse_scene(file: Path) -> Path:
     return file
 
 
+def one_of(*known: str) -> Callable[[str | None], str | None]:
+    """A check of an option that takes a few words."""
+
+    def check(word: str | None) -> str | None:
+        if word not in (None, *known):
+            raise typer.BadParameter(f"{word} is refused: give {' or '.join(known)}")
+        return word
+
+    return check
+
+
 OF_PACKING = "What `ramp`, `perturb`, `drive` or `import` has written (.h5), or NAME.disks from the dumps of a deck."
 PackingFile = Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback=refuse_scene)]
 
@@ -79,12 +89,10 @@ def command(
     *,
     name: str | None = None,
     reads: str | None = None,
-    task: Any = None,
     writes: str = "",
     kept: str = "",
     alone: bool = False,
     as_json: bool = False,
-    aloud: bool = False,
 ) -> Callable[[Callable[P, Results]], Callable[P, Results]]:
     """Make a function a command: its scene is read, its output is kept from others, and what it yields is printed.
 
@@ -97,18 +105,16 @@ def command(
         Of the help.
     name : str, optional
         Of the command; by default that of the function.
-    reads, task : str, optional
-        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written; a task
-        that would never end is refused.
+    reads : str, optional
+        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
     writes : {"", "file", "new", "run", "folder"}
         What the option `output` is, see `locked`.
     kept : str
         What an interrupt leaves of the output, in words that name it as {output}.
     alone : bool
         Whether rank 0 alone works.
-    as_json, aloud : bool
-        Whether the command has the option --json, and whether it then prints all lines to standard error; otherwise
-        those that follow the document.
+    as_json : bool
+        Whether the command has the option --json. Lines that follow the document then go to standard error.
     """
 
     def register(work: Callable[P, Results]) -> Callable[P, Results]:
@@ -122,14 +128,14 @@ def command(
                 return
             inputs = [given[key] for key in ("file", "scene") if isinstance(given.get(key), Path)]
             if reads is not None:
-                given["scene"] = scene = read_scene(given["scene"], reads, task)
+                given["scene"] = scene = read_scene(given["scene"], reads)
                 inputs += [path for paths in scene.files.values() for path in paths]
             with ExitStack() as held:
                 if writes and (output := given["output"]) is not None:
                     held.enter_context(locked(output, *inputs, kind=writes))
                     if kept:
-                        keeps(kept.format(output=output), output)
-                speak = (say if aloud else lambda line: None) if as_json else print_line
+                        keeps(kept.format(output=output))
+                speak: Callable[[str], object] = (lambda line: None) if as_json else print_line
                 for result in work(**given):  # type: ignore[call-arg]
                     if isinstance(result, str):
                         speak(result)
@@ -151,21 +157,15 @@ def command(
     return register
 
 
-def read_scene(path: Path, command: str, task: Any = None) -> Scene:
-    """The part of a scene file that a command reads; a task that would never end is refused."""
+def read_scene(path: Path, command: str) -> Scene:
+    """The part of a scene file that a command reads."""
     from faultgouge.analysis.files.formats import READERS
-    from faultgouge.pywrap.scenes.scene import Scene, refuse_endless
+    from faultgouge.pywrap.scenes.scene import Scene
 
-    if path.suffix == ".h5":
-        raise typer.BadParameter(f"{path} is a stored run, and {command} reads a scene: give its .toml file")
-    if path.suffix in READERS:
-        name_it = 'write file = "packing.h5" under [packing] of the scene'
-        convert = f"convert it by `faultgouge import {path} -o packing.h5`, and {name_it}"
-        raise typer.BadParameter(f"{path} is a packing, and {command} reads a scene: {convert}")
-    scene = Scene.from_toml(path, command=command)
-    if task is not None:
-        refuse_endless(scene, task)
-    return scene
+    if path.suffix in (".h5", *READERS):
+        under = f'a packing stands in a scene as file = "{path}" under [packing]'
+        raise typer.BadParameter(f"{path} is no scene, and {command} reads one, a .toml file: {under}")
+    return Scene.from_toml(path, command=command)
 
 
 @contextmanager
@@ -184,44 +184,42 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
     if not is_root():
         yield
         return
-    is_new_folder = kind == "folder" and not output.exists()
     if kind == "folder":
         make_folder(output)
     if lock := lock_of(output):
         holds(lock)  # the guard removes the lock of a work that cannot do so itself
-    try:
-        with nullcontext() if kind == "run" else lock_output(output):
-            yield
-    finally:
-        if is_new_folder:
-            with suppress(OSError):  # unless something has been written there
-                output.rmdir()
+    with nullcontext() if kind == "run" else lock_output(output):
+        yield
 
 
 def stored_packing(file: Path, frame: int = -1, time: float | None = None) -> Packing | Configuration:
-    """A packing of the dumps that decks write or of a stored run: that of a frame, or a driven one nearest to a time; a
-    run.h5 that holds a configuration has no other."""
+    """A packing of the dumps that decks write or of a stored run: that of a frame, or a driven one close to a time."""
     from faultgouge.analysis import BadInputError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.door import load, packing_in
 
-    if time is not None and not isfinite(time):
-        raise BadInputError(f"--time {time:g} is no time: give a number")
-    single, timeless = holds_configuration(file), f"{file} has no states in time: --time chooses a state of a drive.h5"
-    if single and frame not in (-1, 0):
-        raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
-    if single or file.suffix == ".disks":
-        if time is not None:
-            raise BadInputError(f"{timeless}; give --frame")
-        return load(file, frame)
-    with RunFile(file) as run:
-        driven = run.attributes.get("task") == "drive"
-        if time is not None and not driven:
-            raise BadInputError(f"{timeless}; give --frame")
-        if not run.complete:
-            stored = counted(len(run), *(("state",) if driven else ("equilibrium", "equilibria")))
-            say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
-        return packing_in(run, frame if time is None else int(abs(run.observable("time") - time).argmin()))
+    if file.suffix == ".disks" or holds_configuration(file):
+        if time is None:
+            return load(file, frame)
+    else:
+        with RunFile(file) as run:
+            if time is None:
+                return packing_in(run, frame)
+            if run.attributes.get("task") == "drive":
+                return packing_in(run, int(abs(run.observable("time") - time).argmin()))
+    raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: arrays as lists, complex numbers as [re, im], and null for what is not finite."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def print_line(result: str) -> None:
@@ -285,21 +283,9 @@ def working(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def progress(items: Iterable[T], what: str, total: int | None = None, done: int = 0) -> Iterator[T]:
-    """The items, with a progress bar on a terminal; off a terminal with a line a minute. Both say how long is left."""
+    """The items, with a `status` that says how many there were, and how long is left."""
     if total is None and isinstance(items, Sized):
         total = len(items)
-    if sys.stderr.isatty() and is_root():
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-        from rich.progress import TimeRemainingColumn as Remaining
-
-        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), Remaining())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(what, total=total, completed=done)
-            for item in items:
-                bar.advance(task)
-                yield item
-        return
     among = "" if total is None else f" of {total}"
     begin = time.monotonic()
     with status(f"{what}: {done}{among}") as show:

@@ -168,15 +168,13 @@ def test_missing_eigenvalues_are_told(losing):
         all_eigenvalues(turned([np.array([[value]]) for value in rng.uniform(1, 50, 150)], rng), **SMALL)
 
 
-@pytest.fixture
-def from_zero(monkeypatch):
-    """`spectrum` in slices of any packing."""
+@pytest.mark.slow
+def test_spectrum_of_a_packing(path, monkeypatch):
+    """Beyond its onset the reference packing has complex pairs."""
+    expected = spectrum(path(0.022))
     monkeypatch.setattr(spectrum_module, "SLICED", 0)
     monkeypatch.setattr(spectrum_module, "all_eigenvalues", lambda matrix: all_eigenvalues(matrix, **SMALL))
-
-
-def same_spectrum(found, expected):
-    """Eigenvalues, pairs and what is known of them."""
+    found = spectrum(path(0.022))
     spacing = np.ptp(expected.eigenvalues.real) / len(expected.eigenvalues)
     assert nearest(found.eigenvalues, expected.eigenvalues).max() < 1e-6 * spacing
     assert found.noise_pairs == expected.noise_pairs
@@ -188,12 +186,3 @@ def same_spectrum(found, expected):
         assert one.overlap == pytest.approx(other.overlap, rel=1e-4)
         assert one.participation == pytest.approx(other.participation, rel=1e-6)
         assert one.rotation == pytest.approx(other.rotation, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_spectrum_of_a_packing(request):
-    """Beyond its onset the reference packing has complex pairs."""
-    packing = request.getfixturevalue("path")(0.022)
-    expected = spectrum(packing)
-    request.getfixturevalue("from_zero")
-    same_spectrum(spectrum(packing), expected)

@@ -18,7 +18,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.motion import rising_load
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.rising_load import Span, motion_under_load
+from faultgouge.analysis.motion.rising_load import motion_under_load
 
 RISE = np.tile([1.0, 0.0], (3, 1))
 
@@ -78,7 +78,7 @@ def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
             speed = 10.0 if number % 5 == 0 else 0.0
             worn, slid = (np.zeros((each.shape[0], 1)) for each in (system.rates, system.excess))
             moved, squares = speed * length * shape, speed**2 * length * shape**2
-            yield Span(length, speed * length * z, worn, moved, squares, slid)
+            yield length, speed * length * z, worn, slid, moved, squares
 
     monkeypatch.setattr(rising_load, "windows_under_load", windows)
     found = motion_under_load(system, forces_on_coordinates(at_rest, RISE), decays=False)

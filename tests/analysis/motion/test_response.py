@@ -10,7 +10,7 @@ from linearised import dissipative, motion_matrix
 from scipy.linalg import block_diag, expm
 
 from faultgouge.analysis import mean_square_displacement
-from faultgouge.analysis.motion.motion import EnergyNorm
+from faultgouge.analysis.motion.motion import energy_norm, matrix_in_norm
 from faultgouge.analysis.responses.matrix_functions import BlockDiagonal, first_order
 from faultgouge.analysis.responses.oscillator import Oscillator, driven_motion, released_motion
 from faultgouge.analysis.responses.response import layer_force, linear_response
@@ -63,11 +63,11 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
         modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
         pairs = ((oscillator.forced_motion, force), (oscillator.free_motion, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
-    norm = EnergyNorm.of(matrix)
+    norm = energy_norm(matrix)
     rows, rest = block_diag(norm.unweight, np.eye(size)), np.zeros(size)
     states = np.concatenate([rest, force]), np.concatenate([norm.weight @ start, rest])
     pairs = zip((partial(driven_motion, OMEGA), released_motion), states, strict=True)
-    modes = BlockDiagonal.of(norm.first_order(matrix, np.eye(size) / tau), first_order)
+    modes = BlockDiagonal.of(matrix_in_norm(norm, matrix, np.eye(size) / tau), first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
 

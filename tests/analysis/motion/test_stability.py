@@ -118,7 +118,7 @@ def test_a_rested_packing_holds_for_every_push_below_its_energy():
 
 
 def test_the_gain_of_energy_bounds_what_motion_gains_without_loss(path):
-    """Of two hundred random states of a layer below its onset, none gains more; and the worst pushes come near."""
+    """Of forty random states of a layer below its onset, none gains more; and the worst pushes come near."""
     from scipy.linalg import expm
 
     from faultgouge.analysis import transient_gain
@@ -133,9 +133,9 @@ def test_the_gain_of_energy_bounds_what_motion_gains_without_loss(path):
     motion = system.motion
     z, norm = motion.first_order, motion.energy_norm
     assert norm.positive
-    step, state = expm(0.1 * z), np.random.default_rng(0).standard_normal((len(z), 200))
+    step, state = expm(0.1 * z), np.random.default_rng(0).standard_normal((len(z), 40))
     first = np.sum(state**2, axis=0)
-    for _ in range(50):
+    for _ in range(25):
         state = step @ state
         assert np.all(np.sum(state**2, axis=0) < reach.gain * first)
 
