@@ -104,7 +104,7 @@ def write_view(
     ends = [0, *turning_points(axis.values), len(packings) - 1] if len(packings) > 1 else []
     legs = [np.arange(a, b + 1) for a, b in pairwise(ends)]
     disks = [each for each in packings if each.law is not None] if len(packings) > 1 else []
-    moved = layer_displacement(disks)[:, 0].tolist() if disks else []  # type: ignore[arg-type]
+    moved = layer_displacement(disks)[:, 0].tolist() if disks else []
     seen = {} if series is None else {name: series[name][series["msd"] > 0] for name in ("time", "msd")}
     images = [(_spheres if first.dimension == 3 else _disks)(packing) for packing in packings]
     # the page opens at the fastest growth of a packing that rests, else of any; at the last one if nothing grows

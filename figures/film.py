@@ -160,7 +160,7 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
                 now = np.where(still, shown, now)
             shown = now
             picture = Image.fromarray(now, "P")
-            picture.putpalette(palette.getpalette())
+            picture.putpalette(colours.ravel().tolist())
             yield picture
 
     first, *others = pictures()

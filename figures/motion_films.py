@@ -143,7 +143,12 @@ def _packing_and_curve(packing: Packing, scale: float = 0.0) -> tuple[Figure, Ax
 
 
 def _beside_curve(
-    artist: PackingArtist, axes: Axes, course: Course, which: NDArray[np.int_], draw: Callable[[int], object], key: str
+    artist: PackingArtist,
+    panels: tuple[Axes, Axes],
+    course: Course,
+    which: NDArray[np.int_],
+    draw: Callable[[int], object],
+    key: str,
 ) -> tuple[list[Artist], Callable[[int], None]]:
     """What moves, and the function that shows a frame, of a packing on the left and its place on a curve on the right.
 
@@ -156,8 +161,7 @@ def _beside_curve(
     key : str
         Words below the packing.
     """
-    left = artist.disks.axes
-    assert left is not None
+    left, axes = panels
     says = left.text(0.5, 1.01, "", transform=left.transAxes, ha="center", va="bottom", fontsize=8)
     left.text(0.5, -0.02, key, transform=left.transAxes, ha="center", va="top", fontsize=7)
     axes.plot(course.x, course.y, color=BULK, linewidth=1.2)
@@ -207,7 +211,7 @@ def film_of_run(motion: RunMotion, frames: int, dots: int | None = DOTS) -> Film
     words = [rf"$t = {t:.3f}$, displacements $\times\,10^{{{power}}}$" for t, power in zip(time, powers, strict=True)]
     course = Course(time, msd, range(len(time)), ("$t$", "$D(t)$"), words)
     which = np.clip(np.searchsorted(time, np.linspace(time[0], time[-1], frames)), 0, len(time) - 1)
-    shown = _beside_curve(artist, beside, course, which, draw, "red: moves farthest; grey: rests")
+    shown = _beside_curve(artist, (axes, beside), course, which, draw, "red: moves farthest; grey: rests")
     return Film(figure, *shown, frames, dots)
 
 
@@ -265,7 +269,7 @@ def film_of_ramp(
     course = course._replace(words=[f"{each}, displacements {magnified}" for each in course.words])
     which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
     key = "the greener, the farther moved" if by_way else ""
-    return Film(figure, *_beside_curve(artist, beside, course, which, draw, key), frames, dots)
+    return Film(figure, *_beside_curve(artist, (axes, beside), course, which, draw, key), frames, dots)
 
 
 def faces_by_way(packings: Sequence[Packing], shifts: Floats) -> list[NDArray[Any]]:

@@ -272,6 +272,6 @@ def _draw_load(axes: Axes, packing: HasConfiguration, view: View) -> None:
         axes.text(x[highest], crest[highest] + length, "$F_y$", ha="center", va="bottom", zorder=6)
     if packing.fx:
         sense, height = np.sign(packing.fx), view.high[1] - 0.3 * length
-        begin = middle + (1.5 if x[highest] < middle else -1.5) * length - sense * length
+        begin = middle + (2.0 if x[highest] < middle else -2.0) * length - sense * length
         axes.quiver([begin], [height], [sense * 2 * length], [0.0], **style)
         axes.text(begin - sense * 0.2 * length, height, "$F_x$", ha="right" if sense > 0 else "left", va="center")
