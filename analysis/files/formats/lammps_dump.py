@@ -10,7 +10,7 @@ are neither slips nor angles, and their columns may be missing. Low parts are th
 
 Law, load and inertia are not part of a dump. They are given by the caller or by a file of the same name with the suffix
 ".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
-inertia_factor. Values from the caller take precedence.
+inertia_factor. A law from the caller takes precedence.
 
 Of a dump custom, columns are x or xu or xs, radius or diameter, and, if present, id, type, mass, theta. Several
 snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
@@ -140,50 +140,35 @@ def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
     return _disks(path, shown, shown.named)
 
 
-def read_dump(
-    disks: str | PathLike[str],
-    contacts: str | PathLike[str] | None = None,
-    *,
-    frame: int = -1,
-    law: MindlinLaw | None = None,
-    fx: float | None = None,
-    fy: float | None = None,
-    inertia_factor: float | None = None,
-) -> Packing:
+def read_dump(disks: str | PathLike[str], *, frame: int = -1, law: MindlinLaw | None = None) -> Packing:
     """Read a packing from the dumps of an input deck.
 
     Parameters
     ----------
     disks : path
-        The dump of disks.
-    contacts : path, optional
-        The dump of contacts; by default the file with the name of the dump of disks and the suffix ".contacts".
+        The dump of disks; that of contacts has its name and the suffix ".contacts".
     frame : int
         Number of the snapshot; negative numbers count from the end. Contacts are read from the snapshot of the same
         time step.
-    law, fx, fy, inertia_factor : optional
-        As in :class:`~faultgouge.analysis.Packing`; by default those of the file ``.params``; without this file, no
-        load and inertia factor 1. The law then has no default.
+    law : MindlinLaw, optional
+        By default that of the file ``.params``, as load, drag and inertia are; without this file there is no load, and
+        the inertia factor is 1.
 
     Raises
     ------
     PackingFileError
         If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
-    found = in_plane(read_deck_dump(Path(disks), frame, contacts, law))
+    found = in_plane(read_deck_dump(Path(disks), frame, law))
     assert found.top is not None
-    own = {"fx": fx, "fy": fy, "inertia_factor": inertia_factor, "drag_time": found.given.get("tau")}
-    load = {name: found.given.get(name) if value is None else value for name, value in own.items()}
-    known = {name: value for name, value in load.items() if value is not None}
-    return packing_of(found, law or law_of_parameters(found.given), found.top, **known)
+    names = {"fx": "fx", "fy": "fy", "inertia_factor": "inertia_factor", "tau": "drag_time"}
+    load = {name: found.given[key] for key, name in names.items() if key in found.given}
+    return packing_of(found, law or law_of_parameters(found.given), found.top, **load)
 
 
-def read_deck_dump(
-    path: Path, frame: int | None = None, contacts: str | PathLike[str] | None = None, law: MindlinLaw | None = None
-) -> Disks:
+def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None = None) -> Disks:
     """Read a dump of write.in, with the slips of all contacts in its .contacts, and the numbers in its .params."""
-    beside = path.with_suffix(".contacts") if contacts is None else Path(contacts)
-    sidecar = path.with_suffix(".params")
+    beside, sidecar = path.with_suffix(".contacts"), path.with_suffix(".params")
     shown, given = _snapshot(path, -1 if frame is None else frame), _numbers_in(sidecar)
     try:
         law = law or law_of_parameters(given)
@@ -207,12 +192,9 @@ def read_deck_dump(
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]
     first, second = np.append(ids[i[touch]], ids[floor]), np.append(ids[j[touch]], 0 * ids[floor])
-    slip, low_slip = (
-        np.append(pair[name][touch], disk[f"floor_{name}"][floor]) if name in pair else None
-        for name in ("slip", "slip_low")
-    )
-    assert slip is not None
-    return replace(found, given=given, slips=Slips(first, second, slip, low_slip, complete=True))
+    names = [name for name in ("slip", "slip_low") if name in pair]
+    slips = [np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for name in names]
+    return replace(found, given=given, slips=Slips(first, second, *slips, complete=True))
 
 
 def _columns(path: Path, frame: DumpFrame, law: MindlinLaw, *needed: str) -> dict[str, Floats]:
