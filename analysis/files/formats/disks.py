@@ -358,10 +358,8 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
     except (OSError, ValueError) as error:
         raise BadInputError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
-        kinds = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
-        y, types = disks.position[:, 1], ", ".join(map(str, kinds)) or "none"
-        layer = f"{disks.source}: its own column top" if says is None else f"{key}{text}: this layer of {disks.source}"
-        raise BadInputError(f"{layer} holds no disk: they go from y = {y.min():g} to {y.max():g}, types: {types}.")
+        y, layer = disks.position[:, 1], "its own column top" if says is None else f"{key}{text}"
+        raise BadInputError(f"{disks.source}: {layer} holds no disk; they go from y = {y.min():g} to {y.max():g}.")
     return chosen
 
 
@@ -379,13 +377,12 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
             order = order[held]
         return np.isin(np.arange(len(disks)), order[: int(text)])
     if kind in ("type", "group") and value:
-        by_name = disks.types if kind == "type" else disks.groups
-        if value in by_name:
-            return by_name[value]
-        if kind == "type" and value.isdecimal() and disks.kind is not None:
-            return np.asarray(disks.kind == int(value))
-        numbers = "numbers, as in type:2" if kind == "type" and disks.kind is not None else "none"
-        raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(by_name) or numbers})")
+        known = dict(disks.types if kind == "type" else disks.groups)
+        if kind == "type" and disks.kind is not None:
+            known = {str(number): disks.kind == number for number in np.unique(disks.kind).tolist()} | known
+        if value not in known:
+            raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(known) or 'none'})")
+        return known[value]
     if kind == "ids" and value:
         wanted = set[int]()
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):

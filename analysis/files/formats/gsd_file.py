@@ -43,9 +43,7 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     log, particles, box = shown.log, shown.particles, shown.configuration.box
     columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
     columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
-    names = list(particles.types or [])
-    known = len(names) > int(np.max(particles.typeid, initial=0))
-    type_names = [names[number] for number in particles.typeid] if known else []
+    type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
         period, number, rows = values.get("box_length"), values.get(FORMAT_KEY), log.get(CONTACTS)
