@@ -230,18 +230,17 @@ def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses
     bare.load_new(str(path), format="H5MD", convert_units=False)
     np.testing.assert_array_equal(universe.atoms.radii, packing.radius)
     np.testing.assert_array_equal(universe.atoms.masses, packing.mass)
-    np.testing.assert_array_equal(universe.select_atoms("type top").indices, np.flatnonzero(packing.top))
-    np.testing.assert_array_equal(universe.select_atoms("type bed").indices, np.flatnonzero(~packing.top))
+    for kind, members in (("top", packing.top), ("bed", ~packing.top)):
+        np.testing.assert_array_equal(universe.select_atoms(f"type {kind}").indices, np.flatnonzero(members))
     with RunFile(path) as file:
-        assert len(file) == 1
         series = file.series("trajectory")
-        np.testing.assert_array_equal(series["time"], file.series("undamped")["time"])
-    time = np.insert(series["time"], 0, 0.0)
+        assert len(file) == 1
+        assert series["time"].tolist() == file.series("undamped")["time"].tolist()
+    time = [0.0, *series["time"]]
     assert len(bare.trajectory) == len(universe.trajectory) == len(time) > 100
     for k, (frame, exact) in enumerate(zip(bare.trajectory, universe.trajectory, strict=True)):
-        assert frame.time == time[k]
+        assert (frame.time, frame.data["fx"]) == (time[k], packing.fx)
         assert frame.dimensions[0] == np.float32(packing.box_length)
-        assert frame.data["fx"] == packing.fx
         np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
         assert exact.data["position"].dtype == np.float64
         np.testing.assert_array_equal(exact.data["position"][:, :2], place[k])
@@ -273,31 +272,31 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("kind", ["formats.xyz", "formats.lammps_data", "formats.gsd_file", "run", "configuration"])
-def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, kind):
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [("formats.xyz", "a.xyz"), ("formats.lammps_data", "a.data"), ("formats.gsd_file", "a.gsd"),
+     ("atomic_write", "run.h5"), ("atomic_write", "configuration.h5")],
+)  # fmt: skip
+def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module, name):
     """And one without a number, of an older version, is read."""
-    suffixes = {"formats.xyz": "xyz", "formats.lammps_data": "data", "formats.gsd_file": "gsd"}
-    path = tmp_path / f"a.{suffixes.get(kind, 'h5')}"
-    place = f"faultgouge.analysis.files.{kind if kind in suffixes else 'atomic_write'}"
 
-    def write(**changed):
+    def write(constant, value):
+        (tmp_path / name).unlink(missing_ok=True)
         with monkeypatch.context() as version:
-            for name, value in changed.items():
-                version.setattr(f"{place}.{name}", value)
-            path.unlink(missing_ok=True)
-            if kind == "configuration":
-                write_configuration(path, configuration)
-            elif kind == "run":
-                with RunFile.create(path, sheared) as file:
+            version.setattr(f"faultgouge.analysis.files.{module}.{constant}", value)
+            if name == "configuration.h5":
+                write_configuration(tmp_path / name, configuration)
+            elif name == "run.h5":
+                with RunFile.create(tmp_path / name, sheared) as file:
                     file.append(sheared)
             else:
-                write_packing(path, sheared)
+                write_packing(tmp_path / name, sheared)
 
-    write(FORMAT=2)
+    write("FORMAT", 2)
     with pytest.raises(PackingFileError, match=LATER):
-        load(path)
-    write(FORMAT_KEY="another_name_123")
-    assert len(load(path)) in (len(sheared), len(configuration))
+        load(tmp_path / name)
+    write("FORMAT_KEY", "another_name_123")
+    assert len(load(tmp_path / name)) == len(sheared)
 
 
 def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):

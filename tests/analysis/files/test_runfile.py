@@ -44,14 +44,11 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
             run.append(state, floor=1e-11 / 3, evaluations=k)
             assert len(run) == k + 1
     with RunFile(path) as run:
-        assert len(run) == 4
-        for k, state in enumerate(states):
-            assert run.packing(k) == state
-            assert run.packing(k - 4) == state
-        np.testing.assert_array_equal(run.fx, [state.fx for state in states])
-        np.testing.assert_array_equal(run.observable("floor"), 4 * [1e-11 / 3])
-        np.testing.assert_array_equal(run.observable("evaluations"), range(4))
-        np.testing.assert_array_equal(run.observable("residual"), [state.residual for state in states])
+        assert [run.packing(k) for k in (*range(4), *range(-4, 0))] == 2 * states
+        expected = {"floor": 4 * [1e-11 / 3], "evaluations": range(4)}
+        expected |= {name: [getattr(state, name) for state in states] for name in ("fx", "residual")}
+        for name, values in expected.items():
+            np.testing.assert_array_equal(run.observable(name), values)
         assert run.attributes == attributes | {"complete": False, "faultgouge_format": 1}
         with pytest.raises(PackingFileError, match="no frame 4"):
             run.packing(4)
@@ -105,8 +102,7 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         run.complete = True
     with RunFile(path) as run:
         assert run.complete
-        for k in range(3):
-            assert run.packing(k) == states[k]
+        assert [run.packing(k) for k in range(3)] == states[:3]
         np.testing.assert_array_equal(run.series("msd")["time"], [0, 1, 2])
         np.testing.assert_array_equal(run.series("msd")["value"], [[1e-20, 1], [2e-20, 2], [3e-20, 3]])
 
