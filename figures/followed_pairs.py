@@ -166,16 +166,11 @@ def _spectrum_of(packing: HasConfiguration, modes: Motions) -> Spectrum:
     pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
     below = is_negative(found.values, found.overlap, rounding, zero)
     free = ~below & is_zero(found.values, found.overlap, zero_uncertainty(packing, rounding), zero)
-    return Spectrum(
-        eigenvalues=found.values,
-        pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
-        negative=np.sort(found.values[below].real),
-        noise_pairs=0,  # they have lost their imaginary parts
-        rattlers=packing.rattlers,
-        rounding=rounding,
-        free=int(free.sum()),
-        packing=packing,
-    )
+    pairs.sort(key=lambda pair: -pair.growth_rate)
+    return Spectrum(  # without noise: such pairs have lost their imaginary parts
+        found.values, tuple(pairs), np.sort(found.values[below].real), noise_pairs=0, rattlers=packing.rattlers,
+        rounding=rounding, free=int(free.sum()), packing=packing,
+    )  # fmt: skip
 
 
 def _about_to_meet(modes: Motions) -> list[Plane]:

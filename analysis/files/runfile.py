@@ -292,16 +292,13 @@ class RunFile:
         names = ("radius", "mass", "inertia_factor", "box_length", "drag_time", "spring")
         with telling(self.path, "is damaged", ValueError):  # numbers that no packing has
             i, j = rows[:, :2].T.astype(np.int64)
+            contacts = Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None)
             return Packing(
-                position=self._file[f"{POSITION}/value"][frame, :, :2],
-                contacts=Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None),
-                law=law_of_parameters(given),
-                top=given["top"].astype(np.bool_),
+                position=self._file[f"{POSITION}/value"][frame, :, :2], contacts=contacts, slips_known=known,
+                law=law_of_parameters(given), top=given["top"].astype(bool),
                 position_low=None if low is None else low[frame],
-                slips_known=known,
-                **seen,
-                **{name: given[name] for name in names if name in given},
-            )
+                **seen, **{name: given[name] for name in names if name in given},
+            )  # fmt: skip
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
         """Add frames of the undamped run that began at the last equilibrium.

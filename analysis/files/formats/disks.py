@@ -216,21 +216,14 @@ def particles_of(
     sides = more.get("periodic")
     closes = box is not None and box[0, 0] > 0 and (sides is None or sides[0])
     return Disks(
-        str(source),
-        np.column_stack([c[axis] for axis in ("xyz" if "z" in c and np.ptp(c["z"]) else "xy")]),
-        c["radius"],
-        c["id"].astype(np.int64),
-        c.get("mass"),
-        c.get("angle"),
-        c["type"].astype(np.int64) if "type" in c else None,
-        c["top"] != 0 if "top" in c else None,
-        np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
-        float(box[0, 0]) if box is not None and closes else None,
-        {str(name): names == name for name in dict.fromkeys(names.tolist())},
-        box=box,
-        first_id=first_id,
-        **more,
-    )
+        str(source), np.column_stack([c[axis] for axis in ("xyz" if "z" in c and np.ptp(c["z"]) else "xy")]),
+        c["radius"], c["id"].astype(np.int64), c.get("mass"), c.get("angle"),
+        kind=c["type"].astype(np.int64) if "type" in c else None,
+        top=c["top"] != 0 if "top" in c else None,
+        position_low=np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
+        box_length=float(box[0, 0]) if box is not None and closes else None,
+        types={str(name): names == name for name in dict.fromkeys(names.tolist())}, box=box, first_id=first_id, **more,
+    )  # fmt: skip
 
 
 def in_plane(found: Disks) -> Disks:
