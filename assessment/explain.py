@@ -105,10 +105,13 @@ def explain(scene: Scene) -> dict[str, Any]:
     scene, remark = affordable(scene)
     packing = settle(scene, communicator=MPI.COMM_SELF).packing
     motion = run_of(scene, packing)
-    with temporary_folder() as folder, Engine(packing, MPI.COMM_SELF, log := Path(folder) / "log") as engine:
-        start, step = engine.driven if "spring" in motion else engine.undamped, 1e-2 / np.sqrt(packing.law.kn)
-        with start(time_step=float(step), **motion):
-            loaded = contents(engine, log)
+    step = float(1e-2 / np.sqrt(packing.law.kn))
+    with (
+        temporary_folder() as folder,
+        Engine(packing, MPI.COMM_SELF, log := Path(folder) / "log") as engine,
+        engine.undamped(step, **motion),
+    ):
+        loaded = contents(engine, log)
     held = {each.partition(" (")[0] for each in everything(loaded)}
     rows = [(name, held.issuperset(brings), why, brings) for name, (why, *brings) in features(packing, motion).items()]
     ranks, threads = MPI.COMM_WORLD.size, os.environ.get("OPENBLAS_NUM_THREADS", "as many threads as cores")
@@ -181,10 +184,8 @@ UNITS = (
 def affordable(scene: Scene) -> tuple[Scene, str]:
     """The scene, or a strip of the layer that settles fast; with a description."""
     section = scene.packing
-    if not isinstance(section, GeneratedPacking):
-        return scene, f"the packing of {section.file.name}"
-    if section.disks <= SETTLED_DISKS:
-        return scene, f"the packing that the scene settles to, {section.disks} disks"
+    if not isinstance(section, GeneratedPacking) or section.disks <= SETTLED_DISKS:
+        return scene, "the packing of the scene"
     share = SETTLED_DISKS / section.disks
     width = max(section.width * share, 4 * max(section.radii))  # at least the narrowest periodic box
     strip = {"disks": SETTLED_DISKS, "top": max(1, round(section.top * share)), "width": width}
@@ -196,8 +197,8 @@ def affordable(scene: Scene) -> tuple[Scene, str]:
 
 
 def run_of(scene: Scene, packing: Packing) -> dict[str, Any]:
-    """The keywords of `Engine.undamped`, or `Engine.driven`, for the scene's run; friction that weakens does so beyond
-    a threshold that is never reached."""
+    """The keywords of `Engine.undamped` for the scene's run; friction that weakens does so beyond a threshold that is
+    never reached."""
     perturb, drive, motion = scene.perturb, scene.drive, dict[str, Any]()
     moved = perturb or drive
     if moved and (signal := moved.forcing()):

@@ -111,7 +111,7 @@ def increments(engine: Engine, start: Equilibrium) -> Row:
     assembled = time.perf_counter()
     factors = factor_stiffness(trial, trial.floor)
     if factors is not None:
-        factors.solve(trial.force)
+        factors.solver.solve(trial.force)
     return {
         "residual": here.residual,
         "floor": here.floor,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .granular.granular_commands import NotTakenError
     from .granular.lammps_path import lammps_path
     from .granular.look_in_a_copy import in_a_copy
-    from .granular.motion_proof import MotionComparison, compare_motion
+    from .granular.motion_compared import MotionComparison, compare_motion
     from .granular.relax import relax
     from .lammps.dynamics import Dynamics
     from .lammps.engine import Engine

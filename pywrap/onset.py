@@ -13,12 +13,11 @@ from mpi4py import MPI
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ..analysis.arrays import Floats
-from ..analysis.errors import FaultgougeError, TurningPointError
+from ..analysis.errors import TurningPointError
 from ..analysis.progress import Watch, report_progress, show_progress
 from ..analysis.windows import NoGrowthError, Ranks, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
-from .load_path import LoadPath
 from .runs.path_error import with_path_error
 from .runs.ramp_loads import ramp_loads
 from .runs.scene_path import scene_path
@@ -26,15 +25,8 @@ from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
 
-ONSET_DISTANCES = np.concatenate(
-    [
-        -np.geomspace(3e-2, 1e-3, 7)[:-1],
-        -np.geomspace(1e-3, 1e-7, 13),
-        [0.0],
-        np.geomspace(1e-6, 1e-3, 9),
-        np.linspace(0.0, 0.3, 76)[1:],
-    ]
-)
+_BELOW = -np.geomspace(3e-2, 1e-3, 7)[:-1], -np.geomspace(1e-3, 1e-7, 13), [0.0]
+ONSET_DISTANCES = np.concatenate([*_BELOW, np.geomspace(1e-6, 1e-3, 9), np.linspace(0.0, 0.3, 76)[1:]])
 """Distances from an onset at which the pair that merges there shows its curve, in units of the ramp's last F_x. Beyond
 the onset the pair turns sharply within one increment."""
 
@@ -130,8 +122,7 @@ def onset_run(
         If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
         negative before any is complex.
     """
-    wanted = ramp_loads(scene)
-    damping = require_section(scene.damping, "damping") if dissipation else None
+    wanted, damping = ramp_loads(scene), require_section(scene.damping, "damping") if dissipation else None
     scene = scene.model_copy(update={"damping": None})
     with show_progress(watch, "settling: "):
         start = settle(scene, mu, bed=bed)
@@ -139,8 +130,7 @@ def onset_run(
         reached(start)
 
     def with_dashpots(packing: Packing) -> Packing:
-        assert damping is not None
-        return packing.with_dissipation(damping.cn, damping.ct, damping.tau)
+        return packing.with_dissipation(damping.cn, damping.ct, damping.tau) if damping else packing
 
     with show_progress(watch), Engine(start.packing) as engine:
         path, forces = scene_path(engine, start, scene, onward=True), wanted
@@ -151,39 +141,32 @@ def onset_run(
                     reached(equilibrium)
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-        at = path if damping is None else lambda fx: with_dashpots(path(fx))
         search = partial(find_onset, dissipation=dissipation, first=first, folder=folder)
         try:
-            found = search(at, forces, ranks=search_ranks())
+            found = search(lambda fx: with_dashpots(path(fx)), forces, ranks=search_ranks())
         except TurningPointError:
             raise
-        except (OnsetError, NoEquilibriumError) as error:
-            raise _as_user_reads(error, path, flows, dissipation) from error
+        except (OnsetError, NoEquilibriumError) as error:  # as the user of a scene reads it
+            undamped = getattr(error, "undamped", None)
+            undamped = undamped and with_path_error(undamped, path)
+            if flows or not isinstance(error, OnsetError):
+                what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
+                finding = (
+                    f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the "
+                    "packing flows before an onset"
+                )
+                raise (
+                    NoGrowthError(finding, undamped=undamped) if undamped else NoEquilibriumError(finding)
+                ) from error
+            failure = partial(NoGrowthError, undamped=undamped) if undamped else OnsetError
+            raise failure(error.finding, "raise ramp.until", error.finer) from error
         equilibria = tuple(path.equilibria)
-        last = equilibria[-1].fx
         near = [] if near_onset is None else (found.fx_c + near_onset).tolist()
-        between = {fx: path(fx) for fx in near if 0 <= fx <= last}
+        between = {fx: path(fx) for fx in near if 0 <= fx <= equilibria[-1].fx}
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
-    return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
-
-
-def _as_user_reads(
-    error: OnsetError | NoEquilibriumError, path: LoadPath[Equilibrium], flows: bool, dissipation: bool
-) -> FaultgougeError:
-    """The error of a search, as the user of a scene reads it."""
-    undamped = error.undamped if isinstance(error, NoGrowthError) else None
-    undamped = None if undamped is None else with_path_error(undamped, path)
-    if flows or not isinstance(error, OnsetError):
-        what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
-        finding = (
-            f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing flows "
-            "before an onset"
-        )
-        return NoEquilibriumError(finding) if undamped is None else NoGrowthError(finding, undamped=undamped)
-    if undamped is None:
-        return OnsetError(error.finding, "raise ramp.until", error.finer)
-    return NoGrowthError(error.finding, "raise ramp.until", error.finer, undamped)
+    beyond = equilibria[-1].fx if flows else None
+    return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=beyond)
 
 
 def search_ranks() -> Ranks:
@@ -218,20 +201,20 @@ def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> floa
     OnsetError
         If no pair becomes complex up to the ramp's end.
     """
-    ramp, mu, found = require_section(scene.ramp, "ramp"), scene.law.mus[0], dict(known or {})
+    ramp, mu = require_section(scene.ramp, "ramp"), scene.law.mus[0]
 
     def onset_for(wanted: float) -> Onset:
-        near = [each for each in found if abs(each - wanted) < 1e-12 * wanted]  # exact but for a product's rounding
-        return found[near[0]] if near else onset_run(scene, wanted, first=True)
+        near = [found for each, found in (known or {}).items() if abs(each - wanted) < 1e-12 * wanted]  # of a product
+        return near[0] if near else onset_run(scene, wanted, first=True)
 
     first = onset_for(mu).windows[0]
-    if scene.friction is not None:
-        weakened = onset_for(mu * scene.friction.mu_ss).fx_c
-        if not weakened < first.fx_onset:
-            raise SceneError(
-                f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the "
-                f"weakened friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
-            )
-        return 0.5 * (weakened + first.fx_onset)
-    end = ramp.first if first.fx_end is None else first.fx_end
-    return min(first.fx_onset + ramp.step, 0.5 * (first.fx_onset + end))
+    if scene.friction is None:
+        end = ramp.first if first.fx_end is None else first.fx_end
+        return min(first.fx_onset + ramp.step, 0.5 * (first.fx_onset + end))
+    weakened = onset_for(mu * scene.friction.mu_ss).fx_c
+    if not weakened < first.fx_onset:
+        raise SceneError(
+            f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the "
+            f"weakened friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
+        )
+    return 0.5 * (weakened + first.fx_onset)

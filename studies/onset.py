@@ -19,7 +19,7 @@ if no equilibrium is found at the onset a second time; the error then is that of
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, eigvals
@@ -37,8 +37,6 @@ from ..pywrap.scenes.command_sections import PATH
 from .packing_tools import Start, contact_pairs, path_from
 from .result_rows import Row
 from .study import task
-
-EndOfRamp = Literal["onset", "until", "flows"]
 
 DISTANCE_BELOW = 1e-7
 """Distance below the onset at which the pair is looked at, in units of F_x^c: the angle between its eigenvectors is
@@ -74,7 +72,7 @@ def onset(scene: Scene, start: Start) -> Row:
 
 def first_window(
     path: LoadPath[Equilibrium], scene: Scene, dissipation: bool = False
-) -> tuple[EndOfRamp, float, Onset | None]:
+) -> tuple[str, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one; with the
     packing's own dashpots and drag, if asked for."""
     try:

@@ -220,9 +220,6 @@ def bisect_amplitude(wave: Wave) -> Row:
     return known | {"below": below, "above": above, "runs": runs, "reached": reached}
 
 
-WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
-
-
 def _threshold_figure(result: Result) -> Figure:
     """The critical amplitude over the frequency, a curve for each distance from the onset.
 
@@ -234,7 +231,7 @@ def _threshold_figure(result: Result) -> Figure:
     from ..figures.style import INK
 
     figure = Figure(figsize=(3.4, 2.9), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel=WAVE[result["on"]])
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel="amplitude $a_c$")
     curves = [list(rows) for _, rows in groupby(result["map"], key=lambda row: row["distance"])][::-1]
     for k, rows in enumerate(curves):
         colour, width = f"C{k % 6}", 3.2 - 2.4 * k / len(curves)

@@ -38,7 +38,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -88,8 +88,6 @@ RISES_IN_DECADES = (5, 10)
 Series = dict[str, Floats]
 """The samples of a run, with one array of shape (T,) for each field of `Sample`."""
 
-Verdict = Literal["does not weaken", "too short", "jump alone", "grows", "unexplained"]
-
 
 class Forecast(NamedTuple):
     """The linear motion after friction has weakened.
@@ -131,7 +129,7 @@ class TriggeringOutcome(NamedTuple):
         Of D from ten times the jump to a tenth of its largest value, where there is a decade between.
     """
 
-    verdict: Verdict
+    verdict: str
     crossing: float | None = None
     jump: float | None = None
     growth: float | None = None
@@ -280,7 +278,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
         fitted = fit_growth(time[later], msd[later], 10 * jump, 0.1 * top)
     except ValueError:
         fitted = None
-    verdict: Verdict = "unexplained"
+    verdict = "unexplained"
     if top < GROWTH_FACTOR * max(jump, foreseen.jump):
         verdict = "jump alone"
     elif fitted is not None and foreseen.rate > 0:

@@ -11,6 +11,8 @@ Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real pa
 eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
@@ -20,7 +22,6 @@ from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import (
     SAFETY,
-    Complexes,
     active_coordinates,
     imbalance,
     is_negative,
@@ -83,7 +84,7 @@ def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
     return not symmetric.shape[0] or negative_pivots(csc_array(symmetric + shifts)) == 0
 
 
-def nearest_modes(packing: HasConfiguration, near: complex, count: int, tolerance: float = 0.0) -> Modes:
+def nearest_modes(packing: HasConfiguration, near: complex, count: int) -> Modes:
     """Compute the eigenvalues nearest to a shift, with left and right vectors, by shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
@@ -97,9 +98,6 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
         The shift sigma, 1 / time^2. It must not be exactly an eigenvalue.
     count : int
         Number of eigenvalues, from 1 to E - 2, with E the number of coordinates on which a force acts.
-    tolerance : float
-        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for the precision
-        of doubles.
 
     Returns
     -------
@@ -125,22 +123,14 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
     factor = symmetric_lu(shifted, pivoting=DIAGONAL_PIVOT)  # the shift may be next to an eigenvalue
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
-    start, solves = np.ones(size, dtype=number), 0
-
-    def nearest(of: csr_array, sigma: complex, trans: str) -> tuple[Complexes, Complexes]:
-        def solve(vector: Complexes) -> Complexes:
-            nonlocal solves
-            solves += 1
-            return factor.solve(vector, trans=trans)
-
-        inverse = LinearOperator(shifted.shape, solve, dtype=number)
-        return eigs(of, count, sigma=sigma, OPinv=inverse, v0=start, tol=tolerance)
-
-    (values, right), (mirrored, left) = nearest(matrix, shift, "N"), nearest(matrix.T, np.conj(shift), "H")
+    start = np.ones(size, dtype=number)
+    inverse, adjoint = (LinearOperator(shifted.shape, partial(factor.solve, trans=side), dtype=number) for side in "NH")
+    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start)
+    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start)
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
     spread = np.zeros((2, packing.coordinates, len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Modes(values, spread[0], spread[1], axes=packing.axes, solves=solves)
+    return Modes(values, spread[0], spread[1], axes=packing.axes)

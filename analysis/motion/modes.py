@@ -78,15 +78,12 @@ class Modes:
         and zero for coordinates on which no force acts.
     axes : int
         Coordinates per particle: 3 for disks, 6 for spheres.
-    solves : int
-        Number of sparse solves; 0 for the dense solver.
     """
 
     values: Complexes
     right: Complexes
     left: Complexes
     axes: int = 3
-    solves: int = 0
 
     @classmethod
     def none(cls, size: int) -> "Modes":
@@ -120,7 +117,7 @@ class Modes:
 
     def chosen(self, which: NDArray) -> "Modes":
         """Some of them, by a mask or by numbers."""
-        return Modes(self.values[which], self.right[:, which], self.left[:, which], self.axes, self.solves)
+        return Modes(self.values[which], self.right[:, which], self.left[:, which], self.axes)
 
     def __len__(self) -> int:
         return len(self.values)

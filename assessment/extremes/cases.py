@@ -41,12 +41,12 @@ from scipy.linalg import eigh, eigvals
 from ...analysis import Contacts, MindlinLaw, Packing, spectrum, stable_timestep, stiffness_matrix, touching
 from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import SAFETY, unit_rounding
-from ...pywrap import Engine, Equilibrium, Scene, equilibrate, settle
+from ...pywrap import Engine, Equilibrium, equilibrate
 from ...pywrap.equilibria.rattlers import place_disks
 from ...pywrap.lammps.decks import Decks
 from ...pywrap.lammps.instance import lammps_instance
 from ...pywrap.runs.undamped import time_step
-from .packings import KN, arches, at_rest, bed, crystal, law, shear_packing, with_low_parts
+from .packings import arches, at_rest, bed, crystal, law, shear_packing, with_low_parts
 
 Measured = tuple[float, float, str]
 """A figure, the bound that it must not exceed, and what both are."""
@@ -166,10 +166,6 @@ def stiffness_and_load() -> Iterator[Case]:
     # the paper's f_min: the iteration ends at the floor, and the residual that is reported is measured
     yield case("f_min = 1e-15 in doubles", partial(under, law(), 3e-3, 1e-15), True)
     yield case("F_x without friction", partial(under, law(mu=0.0), 1e-3), True, "flows")
-    loose = {"packing": {"disks": 24, "top": 5, "width": 5.95, "seed": 2}, "law": {"kn": KN}, "load": {"fy": 0.1 * KN}}
-    # every rank by itself: an error of one rank ends the others
-    settled = partial(settle, Scene.from_mapping(loose), communicator=MPI.COMM_SELF)
-    yield case("load 0.1 k_n from a loose start", settled, True, "contact law does not hold")
 
 
 def disks(places: list[tuple[float, float]], slip: float | None = None, **changes: Any) -> Packing:
@@ -184,7 +180,7 @@ def disks(places: list[tuple[float, float]], slip: float | None = None, **change
 
 def deck(places: list[tuple[float, float]], *commands: str) -> None:
     """LAMMPS with disks of diameter one at given places, and commands; every rank has an instance of its own."""
-    decks = Decks(lammps_instance(MPI.COMM_SELF, None))
+    instance = lammps_instance(MPI.COMM_SELF, None)
     try:
         for line in (
             *("units lj", "dimension 2", "boundary p f p", "atom_style sphere", "comm_modify vel yes"),
@@ -194,9 +190,9 @@ def deck(places: list[tuple[float, float]], *commands: str) -> None:
             *("pair_style mindlin/smooth 2e5 5e4 1.0", "pair_coeff * *"),
             *("fix floor all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.0", "fix move all nve/disc 1.0", *commands),
         ):
-            decks.command(line)
+            Decks(instance).command(line)
     finally:
-        decks.lammps.close()
+        instance.close()
 
 
 def geometry() -> Iterator[Case]:
@@ -248,11 +244,9 @@ def geometry() -> Iterator[Case]:
     yield case("grazing", grazing, True)
     for wide in (3, 10, 100, 1000, 10_000):
         yield case(f"box {wide} wide", partial(rests, partial(crystal, wide)), wide < 100)
-    narrow = {"packing": {"disks": 10, "top": 1, "width": 2.7}, "law": {"kn": KN}, "load": {"fy": 3.0}}
     centred, inside = [(3.0, 3.0), (3.0, 3.0)], [(3.0, 3.0), (3.4, 3.0)]
     for name, make, quick, words in (
         ("box 2 wide", lambda: crystal(2), True, "under two largest diameters"),
-        ("box under two diameters, a scene", lambda: Scene.from_mapping(narrow), True, "widen the box"),
         ("one centre", lambda: stiffness_matrix(disks(centred, slip=0.0)), True, "same centre"),
         ("one centre, LAMMPS", lambda: deck(centred, "run 0"), True, "have the same centre"),
         ("a centre inside of the other disk, LAMMPS", lambda: deck(inside, "run 0"), False, "law does not hold"),

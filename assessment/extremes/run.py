@@ -7,7 +7,6 @@ their number changes no figure. Rank 0 writes.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 from pathlib import Path
@@ -110,11 +109,9 @@ def extremes_figure(done: Sequence[Outcome]) -> Figure:
         axes.plot(ratios, rows, style[0], color=style[1:], label=f"{len(rows)} {words}")
         if status != "refused":
             axes.hlines(rows, LOWEST, ratios, color=style[1:], linewidth=0.6, alpha=0.5)
-    names = (re.sub(r"([kFf])_([a-z]+)(\^c)?", r"$\1_{\2}\3$", each["name"]) for each in done)
-    labels = [name.replace("mu =", r"$\mu$ =").replace("eps =", r"$\epsilon$ =") for name in names]
     axes.axvline(1, color=INK, linewidth=0.8)
     axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(len(done), -1), xlabel="figure / bound")
-    axes.set_yticks(range(len(done)), labels, fontsize=7)
+    axes.set_yticks(range(len(done)), [each["name"] for each in done], fontsize=7)
     axes.set_xticks([LOWEST, 1e-4, 1e-2, 1], ["0", "$10^{-4}$", "$10^{-2}$", "1"])
     axes.tick_params(axis="x", labeltop=True)  # the picture is longer than a screen
     axes.minorticks_off()

@@ -18,7 +18,6 @@ import numpy as np
 
 from ...analysis import Onset, Packing, dynamical_matrix, find_onset, spectrum
 from ...pywrap import Engine, Equilibrium, equilibrate
-from ...pywrap.equilibria.quasistatic import rounding_floor
 from ...pywrap.load_path import LoadPath
 from ...pywrap.runs.scene_path import scene_path
 from .study import COMPENSATED_SUFFIX, Run, Settings, Study, compensate, study_of, timed
@@ -80,9 +79,8 @@ def relaxation(settings: Settings) -> Study:
         reference_error = end.floor * softness
         # both increments of the compensated arithmetic end at the same packing
         points, _ = timed(runs, settings, lambda packing: distance(packing, end.packing) or reference_error)
-    theory = [("rounding of doubles", rounding_floor(start.packing) * softness, ())]
     numbers = {"packing": end.packing, "start": start, "slowest": slowest, "fastest": fastest}
-    return study_of("relaxation", points, reference_error, numbers, theory)
+    return study_of("relaxation", points, reference_error, numbers)
 
 
 def scan(path: Path, increment: float) -> tuple[float, int]:
@@ -128,6 +126,4 @@ def onset(settings: Settings) -> Study:
         points, _ = timed(runs, settings, lambda fx: max(abs(fx - exact), resolution))
     numbers = {"exact": exact, "packing": start.packing, "finest": finest, "check": check, "resolution": resolution}
     numbers |= {"residual": max(each.residual for each in settings.ramp)}
-    counts = np.array([3.0, 300.0])
-    theory = [("half an increment", 0.5 * exact / counts, counts)]
-    return study_of("onset", points, found.error + abs(rough.fx_c - exact), numbers, theory)
+    return study_of("onset", points, found.error + abs(rough.fx_c - exact), numbers)

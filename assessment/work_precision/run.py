@@ -105,8 +105,7 @@ def figure_of(study: Study) -> Figure:
     """Two panels that share the errors, doubly logarithmic: over wall time, and over work or the parameter.
 
     A method in compensated arithmetic has the colour of the plain one, hollow and broken. Methods are lines through
-    their points, where the error falls steadily. Theory is grey. Errors in the shade are below the reference's own
-    error.
+    their points, where the error falls steadily. Errors in the shade are below the reference's own error.
     """
     figure = Figure(figsize=(6.8, 3.5), layout="constrained")
     left, right = panels = figure.subplots(1, 2, sharey=True)
@@ -126,17 +125,10 @@ def figure_of(study: Study) -> Figure:
         left.plot([point["seconds"] for point in points], error, label=method, **style)
         seen = [(point[abscissa], e) for point, e in zip(points, error, strict=True) if point[abscissa]]
         right.plot(*np.transpose(seen), **style)
-    for line, dash in zip(study["theory"], ("--", ":", "-."), strict=False):
-        grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": dash, "label": line["label"]}
-        if line["parameter"]:
-            right.plot(line["parameter"], line["error"], **grey)
-        else:
-            right.axhline(line["error"][0], **grey)
     left.set(xscale="log", yscale="log", xlabel="wall time, s", ylabel=_label(study["error"]))
     left.set_ylim(bottom=bottom)
     right.set(xscale="log", xlabel=_label(study[abscissa]))
-    (handles, labels), (more, names) = (axes.get_legend_handles_labels() for axes in panels)
-    figure.legend(handles + more, labels + names, loc="outside lower center", ncols=3, columnspacing=1.2)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, columnspacing=1.2)
     for axes in panels:
         axes.axhspan(bottom, max(own, bottom), color="#e9e9e9", linewidth=0, zorder=0)
         axes.grid(color=INK, alpha=0.12, linewidth=0.4)

@@ -35,9 +35,6 @@ Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
 """A method, the parameter that sets its accuracy, and what it computes: a result, and the work that it took, counted in
 what does not depend on the machine."""
 
-Theory = Sequence[tuple[str, Any, Any]]
-"""Labels, errors, and where a curve goes through them; nothing there for a floor."""
-
 Study = dict[str, Any]
 """What report.json has of a study, see `study_of`."""
 
@@ -100,9 +97,7 @@ def timed(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float
     return points, [found[k][0] for k in places]
 
 
-def study_of(
-    section: str, points: list[Point], reference_error: float, numbers: dict[str, Any], theory: Theory, **more: Any
-) -> Study:
+def study_of(section: str, points: list[Point], reference_error: float, numbers: dict[str, Any], **more: Any) -> Study:
     """Make a study from its results and from the texts of words.toml.
 
     Parameters
@@ -117,8 +112,6 @@ def study_of(
     numbers : mapping
         Numbers that the texts use; the texts also have `orders`, `points`, and by method the point of least error,
         `best`.
-    theory : sequence of (str, array_like, array_like)
-        Lines of the figure.
     **more
         orders : those that theory predicts, of `fit_order`.
     """
@@ -128,12 +121,8 @@ def study_of(
         name: text.format(**known) if isinstance(text, str) else [line.format(**known) for line in text]
         for name, text in WORDS[section].items()
     }
-    lines = [
-        {"label": label, "error": np.ravel(error).tolist(), "parameter": np.ravel(parameter).tolist()}
-        for label, error, parameter in theory
-    ]
     rows = [point._asdict() for point in points]
-    return said | {"orders": []} | {"reference_error": reference_error, "points": rows, "theory": lines} | more
+    return said | {"orders": []} | {"reference_error": reference_error, "points": rows} | more
 
 
 def compensate(equilibrium: Equilibrium) -> Equilibrium:

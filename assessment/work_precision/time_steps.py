@@ -38,7 +38,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import eig
 
-from ...analysis import MindlinLaw, Packing, discrete_frequency, dynamical_matrix, stable_timestep, touching
+from ...analysis import MindlinLaw, Packing, dynamical_matrix, stable_timestep, touching
 from ...analysis.arrays import Floats
 from ...analysis.motion.eigenvalues import unit_rounding
 from ...pywrap import Engine
@@ -109,10 +109,8 @@ def trajectory(settings: Settings) -> Study:
         points, found = timed(runs, settings, lambda end: float(np.abs(end - exact).max()))
     reference_error = float(np.abs(exact - rough).max())
     apart = float(np.abs(np.subtract(found[:coarse], found[fine:])).max())
-    across = TIME / np.array([steps[0], steps[-1]])
-    theory = [("order 2", 2e-4 * (steps[0] / TIME * across) ** 2, across)]
     orders = [fit_order(points, name, 2, least=100 * reference_error) for name in ("LAMMPS", "NumPy")]
-    return study_of("trajectory", points, reference_error, {"apart": apart}, theory, orders=orders)
+    return study_of("trajectory", points, reference_error, {"apart": apart}, orders=orders)
 
 
 def growth(settings: Settings) -> Study:
@@ -159,10 +157,7 @@ def growth(settings: Settings) -> Study:
     corrected = zip(points, errors, strict=True)
     points += [point._replace(method=RUN_CORRECTED, error=both[1]) for point, both in list(corrected)]
     noise = float(np.median([point.error for point in points if point.method == RUN_CORRECTED]))
-    curve = np.geomspace(steps[-1], steps[0], 60)
-    predicted = [off(complex(discrete_frequency(omega**2, dt))) for dt in curve.tolist()]
-    theory = [("velocity Verlet on a frozen K", predicted, curve), ("rounding of K", resolution, ())]
     order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
     numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}
     numbers |= {"slower": 2 / limit / abs(omega), "resolution": resolution}
-    return study_of("growth", points, resolution, numbers, theory, orders=[order])
+    return study_of("growth", points, resolution, numbers, orders=[order])

@@ -126,12 +126,17 @@ def iterate_newton(
     int
         Force evaluations.
     """
+
+    def bearing(trial: Trial, least: float) -> Floats:
+        """Contacts of each disk that carry more than a force, shape (N,)."""
+        return trial.graph.per_disk(trial.derivatives.normal_force > least)
+
     base, since, top = start.packing, start.graph, start.still.top
     displacement, factors, last = guess or Guess(np.zeros(3 * len(base)))
     iterations, gain = PATIENCE if patient else (NEWTON_ITERATIONS, LEAST_GAIN)
     # rattlers carry no more than an equilibrium may leave
     idle = IDLE_FORCE_SHARE * float(start.derivatives.normal_force.max(initial=0.0)) if patient else 0.0
-    loose = (_count_bearing_contacts(start, max(FLOORS_OF_ROUNDING * start.floor, idle)) == 0) & ~top
+    loose = (bearing(start, max(FLOORS_OF_ROUNDING * start.floor, idle)) == 0) & ~top
     times_moved = np.zeros(len(base), dtype=np.int64)
     best: Trial | None = None
     # `last` and `earlier` are the residuals of the two iterations before, and the factors of K are of an earlier trial
@@ -160,7 +165,7 @@ def iterate_newton(
                 return best, evaluations
         suffice = residual * (residual / last) ** REUSE_ITERATIONS < 0.1 * floor
         if factors is None or not (suffice or (len(base) > REUSE_SIZE and residual <= REUSE_LIMIT * last)):
-            floor, count = trial.floor, _count_bearing_contacts(trial, trial.floor)
+            floor, count = trial.floor, bearing(trial, trial.floor)
             # rattlers that a neighbour ran into, and disks with one contact left, new rattlers
             hit = ((count == 1) & ~top) | (loose & (count > 0))
             disks = np.flatnonzero(hit & (times_moved < RATTLER_MOVES))
@@ -170,23 +175,18 @@ def iterate_newton(
                 trial, evaluations = displaced(base, displacement), evaluations + 1
             factors = factor_stiffness(trial, floor, since, factors)
         earlier, last = last, trial.residual
-        step = None if factors is None else factors.solve(trial.force)
+        step = None if factors is None else factors.solver.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
         if iteration < FREEING_ITERATIONS and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
         if base.compensated:
             # the displacement is a double: from its rounding on it is measured from the iterate
-            rounding = trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max())
-            if trial.residual < FLOORS_OF_ROUNDING * trial.force_rounding(rounding):
+            rounding = trial.packing.coordinate_rounding + EPSILON * float(np.abs(displacement).max())
+            if trial.residual < FLOORS_OF_ROUNDING * trial.graph.rounding(trial.derivatives.normal_stiffness, rounding):
                 base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step
     return None, evaluations
-
-
-def _count_bearing_contacts(trial: Trial, least: float) -> Floats:
-    """Number of contacts of each disk that carry more than a given force, shape (N,)."""
-    return trial.graph.count(trial.derivatives.normal_force > least)
 
 
 def too_long(step: Floats, packing: Packing) -> bool:

@@ -38,22 +38,10 @@ BAND_SIZE = 3000
 
 
 class StiffnessFactors(NamedTuple):
-    """The factors of K at a trial.
-
-    Attributes
-    ----------
-    solver : Solver
-        Solves with the factors.
-    expelled : ndarray of bool, shape (N,)
-        Disks that a neighbour or two ran into and nothing else holds.
-    """
+    """The factors of K at a trial, and disks that a neighbour or two ran into and nothing else holds, shape (N,)."""
 
     solver: Solver
     expelled: Booleans
-
-    def solve(self, force: Floats) -> Floats | None:
-        """The solution of K dq = F, shape (3N,), on the coordinates that K knows; None if K is singular."""
-        return self.solver.solve(force)
 
 
 def factor_stiffness(
@@ -78,41 +66,35 @@ def factor_stiffness(
         slip_derivative = np.where(old, law.slip_derivative, SLIPLESS_SHARE * law.slip_derivative)
         law = law._replace(slip_derivative=slip_derivative)
     normal, distance, _ = trial.branches
-    terms = contact_terms(law, normal, distance, graph.pairs)
-    if not loaded.all():
-        terms = np.where(loaded, terms, 0.0)
+    terms = np.where(loaded, contact_terms(law, normal, distance, graph.pairs), 0.0)
     active = graph.per_coordinate(terms.reshape(9, -1)[::4]) != 0
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
     matters = loaded & (law.normal_force > IDLE_FORCE_SHARE * law.normal_force.max(initial=0.0))
-    idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
+    idle = graph.per_disk(matters) == 0  # disks with none but contacts that carry nothing that matters
     # disks with one loaded contact, or with two that are both new
-    count = graph.count(loaded)
+    count = graph.per_disk(loaded)
     expelled = count == 1
     if old is not None:
         expelled |= (count == 2) & (graph.per_disk(loaded & old) == 0)
     expelled &= ~trial.still.top
+
+    def stiffen_idle(diagonal: Floats, disk: Indices) -> Floats:
+        """The diagonal of K, larger by `HOLDING_SHARE` for idle disks and by `FLOATING_SHARE` for all others."""
+        stiffest = np.zeros(len(idle))
+        np.maximum.at(stiffest, disk, diagonal)
+        return np.where(idle[disk], diagonal + HOLDING_SHARE * stiffest[disk], (1 + FLOATING_SHARE) * diagonal)
+
     if unknowns <= BAND_SIZE:
         band = graph.band(active)
         rows = band.matrix(terms)
-        rows[2 * band.width] = _stiffen_idle(rows[2 * band.width], band.disks, idle)
+        rows[2 * band.width] = stiffen_idle(rows[2 * band.width], band.disks)
         return StiffnessFactors(BandSolver(band, rows), expelled)
-    i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
-    matrix = assemble_stiffness(terms, i, j, disks)
-    matrix.setdiag(_stiffen_idle(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
+    i, j = graph.i, graph.j[: graph.pairs]
+    matrix = assemble_stiffness(terms, i, j, graph.disks)
+    matrix.setdiag(stiffen_idle(matrix.diagonal(), np.tile(np.arange(graph.disks), 3)))
     matrix.eliminate_zeros()
     coupled = np.flatnonzero(loaded[: graph.pairs])
     near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
     return StiffnessFactors(SparseSolver(matrix, i[coupled], j[coupled], near), expelled)
-
-
-def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
-    """The diagonal of K, larger by `HOLDING_SHARE` for idle disks and by `FLOATING_SHARE` for all others."""
-    held = (1 + FLOATING_SHARE) * diagonal
-    creeping = idle[disk]
-    if creeping.any():
-        stiffest = np.zeros(len(idle))
-        np.maximum.at(stiffest, disk, diagonal)
-        held[creeping] = diagonal[creeping] + HOLDING_SHARE * stiffest[disk[creeping]]
-    return held

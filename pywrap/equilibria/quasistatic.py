@@ -11,7 +11,6 @@ If Newton's method fails, the increment is halved, because friction depends on t
 are tried (`ATTEMPTS`) before the packing is reported to flow.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,6 @@ from ...analysis.arrays import Indices
 from ...analysis.counted import counted
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.engine import Engine
-from ..lammps.trial_state import rounding
 from .newton import Guess, iterate_newton, too_long
 from .newton_matrix import factor_stiffness
 
@@ -101,8 +99,8 @@ def rounding_floor(packing: Packing) -> float:
 
     The forces of a disk's contacts are summed as independent errors, and the largest over disks is taken.
     """
-    graph = ContactGraph(packing.contacts, packing.radius)
-    return rounding(packing.law.normal_stiffness(packing.geometry.overlap), graph, packing.coordinate_rounding)
+    stiffness = packing.law.normal_stiffness(packing.geometry.overlap)
+    return ContactGraph(packing.contacts, packing.radius).rounding(stiffness, packing.coordinate_rounding)
 
 
 def idle_disks(packing: Packing) -> Indices:
@@ -142,114 +140,93 @@ def equilibrate(
     NoEquilibriumError
         If no permitted method finds an equilibrium.
     """
-    guess = _response(engine, last, fx) if beside is None else _in_proportion(last, beside, fx)
-    here = _halve_increments(engine, last, fx, force_tolerance, guess)
-    onward = onward and last.fx != fx
-    if here.fx != fx and onward:
-        here = _otherwise(engine, here, last, fx, force_tolerance)
-    if here.fx != fx or here is last:
+    packing, guess, onward = last.packing, None, onward and last.fx != fx
+    if beside is not None:  # the displacement to the other equilibrium in proportion
+        moved = nearest_image(beside.packing.position - packing.position, packing.box_length)
+        turned = beside.packing.scaled_angle - packing.scaled_angle
+        share = (fx - last.fx) / (beside.fx - last.fx)
+        guess = Guess(np.concatenate([moved[:, 0], moved[:, 1], turned]) * share)
+    elif fx != packing.fx:  # the linear response to the increment, which is Newton's first step
+        push, trial = np.zeros(3 * len(packing)), engine.trial_of(packing)
+        push[: len(packing)][packing.top] = fx - packing.fx
+        factors = factor_stiffness(trial, trial.floor)
+        step = None if factors is None else factors.solver.solve(push)
+        guess = None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
+    here, target, evaluations = last, fx, 0
+    while here.fx != fx or here is last:
+        found, spent = _newton(engine, here, target, force_tolerance, guess)
+        evaluations += spent
+        if found is not None:
+            here, target = found, fx
+        elif guess is not None:
+            guess = None
+        elif fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
+            break
+        else:
+            target = 0.5 * (here.fx + target)
+    else:
+        return replace(here, evaluations=evaluations)
+    found = _otherwise(engine, here, last, fx, force_tolerance) if onward else None
+    if found is None:
         tried = f"; tried were {ATTEMPTS}" if onward else ""
         raise NoEquilibriumError(
             f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
             f"{'' if here.packing.law.frictional else SMOOTH_FLOOR_ADVICE}",
             here.fx,
         )
-    return here
+    return found
 
 
-def _halve_increments(
-    engine: Engine, last: Equilibrium, fx: float, force_tolerance: float | None, guess: Guess | None
-) -> Equilibrium:
-    """The equilibrium at fx, or the furthest one, by Newton's method with increments that are halved where it fails."""
-    here, target, evaluations = last, fx, 0
-    while True:
-        engine.set_fx(target)
-        found, spent = _newton(engine, here.packing, force_tolerance, guess)
-        evaluations += spent
-        if found is None and guess is not None:
-            guess = None
-        elif found is None:
-            if fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
-                return here
-            target = 0.5 * (here.fx + target)
-        elif target == fx:
-            return replace(found, evaluations=evaluations)
-        else:
-            here, target = found, fx
+def _newton(
+    engine: Engine,
+    base: Equilibrium,
+    fx: float,
+    force_tolerance: float | None,
+    guess: Guess | None = None,
+    patient: bool = False,
+) -> tuple[Equilibrium | None, int]:
+    """Newton's method from one equilibrium, None where it does not converge; and the force evaluations."""
+    engine.set_fx(fx)
+    trial = engine.trial_of(base.packing)
+    best, evaluations = iterate_newton(engine.try_displacement, trial, force_tolerance, guess, patient)
+    if best is None:
+        return None, evaluations
+    engine.kept = best
+    return Equilibrium(best.packing, best.residual, best.floor, evaluations), evaluations
 
 
 def _otherwise(
     engine: Engine, here: Equilibrium, last: Equilibrium, fx: float, force_tolerance: float | None
-) -> Equilibrium:
-    """The equilibrium at fx by the ways of `ATTEMPTS`, in that order; `here` if none leads there."""
+) -> Equilibrium | None:
+    """The equilibrium at fx by the ways of `ATTEMPTS`, in that order; None if none leads there."""
+
+    def through(start: Equilibrium, loads: list[float], way: str) -> Equilibrium | None:
+        """The equilibrium at the last of some loads, in patient steps through all; None if one has no equilibrium."""
+        now, evaluations = start, start.evaluations
+        for load in loads:
+            found, spent = _newton(engine, now, load, force_tolerance, patient=True)
+            if found is None:
+                return None
+            now, evaluations = found, evaluations + spent
+        return replace(now, evaluations=evaluations, way=way)
+
     routes: list[tuple[str, Equilibrium, list[float]]] = [("more iterations", here, [fx])]
     for count in INCREMENT_PARTS:
         routes.append((f"{count} increments", last, np.linspace(last.fx, fx, count + 1)[1:].tolist()))
     routes.append(("a larger increment and back", last, [2 * fx - last.fx, fx]))
     for way, start, loads in routes:
-        found = _through(engine, start, loads, force_tolerance)
-        if found is not None:
-            return replace(found, way=f"{way} from F_x = {start.fx:.10g}")
-    near = _at_rest(engine, here, fx)
-    found = None if near is None else _through(engine, near, [fx], force_tolerance)
-    return here if found is None else replace(found, way=f"overdamped dynamics from F_x = {here.fx:.10g}")
-
-
-def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | None:
-    """The rest of overdamped dynamics at fx; None if the layer flows on by a diameter, or creeps too long."""
-    engine.restore(start.packing)
+        if found := through(start, loads, f"{way} from F_x = {start.fx:.10g}"):
+            return found
+    # the rest of overdamped dynamics at fx, unless the layer flows on by a diameter, or creeps too long
+    engine.restore(here.packing)
     engine.set_fx(fx)
-    here, flown, steps = start.packing, 0.0, 0
-    most = min(MOST_DYNAMICS_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(here)))
-    while abs(flown) < 2 * here.radius.mean() and steps < most:
-        rest = engine.relax(FORCE_AT_REST * here.fy, steps=max(FEWEST_STEPS, most // LOOKS_AT_LAYER))
-        before, here, steps = here, engine.packing, steps + rest.steps
+    packing, flown, steps = here.packing, 0.0, 0
+    most = min(MOST_DYNAMICS_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(packing)))
+    while abs(flown) < 2 * packing.radius.mean() and steps < most:
+        rest = engine.relax(FORCE_AT_REST * packing.fy, steps=max(FEWEST_STEPS, most // LOOKS_AT_LAYER))
+        before, packing, steps = packing, engine.packing, steps + rest.steps
         if rest.status != "no":
-            return Equilibrium(here, rest.residual, rounding_floor(here), steps)
-        flown += float(nearest_image(here.position - before.position, here.box_length)[here.top, 0].mean())
+            near = Equilibrium(packing, rest.residual, rounding_floor(packing), steps)
+            return through(near, [fx], f"overdamped dynamics from F_x = {here.fx:.10g}")
+        flown += float(nearest_image(packing.position - before.position, packing.box_length)[packing.top, 0].mean())
     return None
-
-
-def _through(
-    engine: Engine, start: Equilibrium, loads: Iterable[float], force_tolerance: float | None
-) -> Equilibrium | None:
-    """The equilibrium at the last of some loads, in patient steps through all; None if one has no equilibrium."""
-    here, evaluations = start, start.evaluations
-    for load in loads:
-        engine.set_fx(float(load))
-        found, spent = _newton(engine, here.packing, force_tolerance, None, patient=True)
-        if found is None:
-            return None
-        here, evaluations = found, evaluations + spent
-    return replace(here, evaluations=evaluations)
-
-
-def _response(engine: Engine, last: Equilibrium, fx: float) -> Guess | None:
-    """The linear response to the increment, which is Newton's first step; None where there is none."""
-    packing = last.packing
-    if fx == packing.fx:
-        return None
-    push = np.zeros(3 * len(packing))
-    push[: len(packing)][packing.top] = fx - packing.fx
-    trial = engine.trial_of(packing)
-    factors = factor_stiffness(trial, trial.floor)
-    step = None if factors is None else factors.solve(push)
-    return None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
-
-
-def _in_proportion(last: Equilibrium, beside: Equilibrium, fx: float) -> Guess:
-    """The displacement from one equilibrium to another, (dx.., dy.., R dtheta..), in proportion to the increment."""
-    a, b = last.packing, beside.packing
-    moved = nearest_image(b.position - a.position, a.box_length)
-    displacement = np.concatenate([moved[:, 0], moved[:, 1], b.scaled_angle - a.scaled_angle])
-    return Guess(displacement * ((fx - last.fx) / (beside.fx - last.fx)))
-
-
-def _newton(
-    engine: Engine, base: Packing, force_tolerance: float | None, guess: Guess | None, patient: bool = False
-) -> tuple[Equilibrium | None, int]:
-    """Newton's method from one base at the engine's fx; None where it does not converge."""
-    best, evaluations = iterate_newton(engine.try_displacement, engine.trial_of(base), force_tolerance, guess, patient)
-    if best is None:
-        return None, evaluations
-    return Equilibrium(engine.keep(best), best.residual, best.floor, evaluations), evaluations

@@ -16,17 +16,15 @@ multiples of 1/4; a law with others is refused. The contact slips by a rotation 
 nothing moves, and the slip is known to the last digit.
 """
 
-from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
-from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError, without_suffix
+from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError
 from .look_in_a_copy import explain_error
 
 EXPONENT_ERROR = 1e-6
@@ -38,6 +36,13 @@ lost ten digits, and one beyond a tenth is that of no contact."""
 
 SLIP_TRIALS = 20
 """Slips that are tried, each a hundredth of what the last one would need at most: one is the rule."""
+
+POWERS = "stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot"
+CLOSING, SLIPPING, ROLLING = range(3)
+"""Motions of a contact, and the components of its force that they change."""
+
+X, Y, Z = range(3)
+"""The normal of the contact that is measured, the direction in which it slips, and the axis about which it rolls."""
 
 
 class State(NamedTuple):
@@ -59,8 +64,7 @@ class State(NamedTuple):
         return 1 / (1 / self.masses[0] + 1 / self.masses[1])
 
 
-@dataclass(frozen=True)
-class PowerOfOverlap:
+class PowerOfOverlap(NamedTuple):
     """factor m^mass (R delta)^overlap."""
 
     factor: float
@@ -72,109 +76,21 @@ class PowerOfOverlap:
         return np.asarray(self.factor * mass**self.mass * (radius * overlap) ** self.overlap)
 
 
-@dataclass(frozen=True)
-class MeasuredLaw:
-    """The law of one pair of types, or of one wall.
-
-    Attributes
-    ----------
-    stiffness, tangential, normal_dashpot, tangential_dashpot : PowerOfOverlap
-        f_n/delta, whose exponent is p - 1, k_t', c_n and c_t.
-    closing, parting : float
-        d ln f_t / d ln delta at constant slip.
-    mu : float
-        Coulomb's coefficient.
-    lever : float
-        l': 0, or 1/2 of an arm that ends in the middle of the overlap.
-    rolling, rolling_dashpot : PowerOfOverlap
-        Stiffness and dashpot of rolling friction: a force, at the arm R, by R times the relative rotation.
-    mu_rolling : float
-        Its bound over the normal force; 0 without rolling friction.
-    """
-
-    stiffness: PowerOfOverlap
-    tangential: PowerOfOverlap
-    normal_dashpot: PowerOfOverlap
-    tangential_dashpot: PowerOfOverlap
-    closing: float
-    parting: float
-    mu: float
-    lever: float
-    rolling: PowerOfOverlap
-    rolling_dashpot: PowerOfOverlap
-    mu_rolling: float
+Law = dict[str, Any]
+"""What :func:`measure_law` returns."""
 
 
-X, Y, Z = range(3)
-"""The normal of the contact that is measured, the direction in which it slips, and the axis about which it rolls."""
-
-
-class TwoParticleLammps:
-    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck.
-
-    The wall is a plane across x, wherever that of the fix is.
-    """
-
-    def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
-        self.lammps = start_lammps(MPI.COMM_SELF, None)
-        wall = isinstance(name, str)
-        self.types = (1,) if isinstance(name, str) else name
-        self.run(
-            f"units {lmp.extract_global('units')}", "atom_style sphere", "atom_modify map yes sort 0 0",
-            "boundary f f f", "newton on", "comm_modify vel yes", f"neighbor {size:.17g} bin",
-            "neigh_modify every 1 delay 0 check no",
-            f"region box block {f' {-40 * size:.17g} {40 * size:.17g}' * 3} units box",
-            f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
-            *["create_atoms 1 single 0 0 0 units box"] * (1 if wall else 2),
-            f"set group all diameter {2 * size:.17g} density 1", "run_style verlet", "group one id 1", *commands.pair,
-        )  # fmt: skip
-        if isinstance(name, str):
-            words = commands.fixes[name].split()
-            at = next(k for k, word in enumerate(words) if word in PLANES)
-            self.run(" ".join([*words[:2], "all", *words[3:at], "xplane 0 NULL", *words[at + 3 :]]))
-        self.run("timestep 1")
-
-    def run(self, *lines: str) -> None:
-        """LAMMPS's commands."""
-        for line in lines:
-            self.lammps.command(line)
-
-    def array(self, name: str) -> Floats:
-        """An array of the particles, as LAMMPS has it."""
-        return np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)]
-
-    def place_at(self, state: State) -> State:
-        """Put the particles into a fresh contact, at rest; the state with the overlap to the last digit."""
-        count = len(self.types)
-        for away in (True, False):
-            self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
-            self.array("type")[:], self.array("x")[:] = self.types, 0.0
-            self.array("x")[0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
-            self.radius = state.radius
-            self.rest()
-        return state._replace(overlap=sum(state.radii) - self.array("x")[0, X])
-
-    def move(self, closing: float = 0.0, slipping: float = 0.0, rolling: float = 0.0, across: float = 0.0) -> None:
-        """Give the first particle a velocity towards the other one, a rotation, as the speed of its surface, one
-        without slip, as the effective radius times its rate, or a velocity across."""
-        self.array("v")[:] = self.array("omega")[:] = 0.0
-        radius, rolls = self.array("radius")[0], rolling / self.radius
-        self.array("v")[0] = -closing, across + radius * rolls, 0.0
-        self.array("omega")[0, Z] = slipping / radius + rolls
-
-    def rest(self) -> None:
-        """Stop the particles, and compute their forces at rest."""
-        self.move()
-        self.run("run 0 post no")
-
-    def force(self) -> tuple[float, float, float]:
-        """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R."""
-        f, torque = self.array("f")[0], self.array("torque")[0, Z]
-        return float(f[X]), float(abs(f[Y])), float(abs(torque) / self.radius)
-
-
-def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
+def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> Law:
     """The law of two types, or of the wall of a fix, from a contact of the packing and from others that are like it.
+
+    Returns
+    -------
+    dict
+        A PowerOfOverlap each: stiffness, f_n/delta, whose exponent is p - 1; tangential, k_t'; normal_dashpot and
+        tangential_dashpot, c_n and c_t; rolling and rolling_dashpot, of rolling friction, a force at the arm R by R
+        times the relative rotation. Numbers: closing and parting, d ln f_t / d ln delta at constant slip; mu,
+        Coulomb's coefficient; lever, l', 0 or 1/2 of an arm that ends in the middle of the overlap; and mu_rolling,
+        the bound of rolling friction over the normal force.
 
     Raises
     ------
@@ -182,13 +98,10 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         If it is no power law of the kind above.
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
-    state = state._replace(overlap=min(max(state.overlap, least), most))
-    wanted = (
-        state,
-        state._replace(overlap=0.5 * state.overlap),
-        state._replace(masses=(3 * state.masses[0], 2 * state.masses[1])),
-        state._replace(radii=(0.5 * state.radii[0], 0.8 * state.radii[1])),
-    )
+    first = state._replace(overlap=min(max(state.overlap, least), most))
+    deeper = first._replace(overlap=0.5 * first.overlap)
+    heavier = first._replace(masses=(3 * first.masses[0], 2 * first.masses[1]))
+    smaller = first._replace(radii=(0.5 * first.radii[0], 0.8 * first.radii[1]))
     try:
         bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
     except Exception as error:  # whatever LAMMPS says of the commands
@@ -196,33 +109,25 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
             f"The commands of the {who} do not stand alone ({explain_error(error)}): {GIVE_LINES}."
         ) from error
     with closing(bench.lammps):
-        states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
-    law: dict[str, Any] = {name: found[0][name] for name in ("mu", "mu_rolling")}
-    for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot"):
-        law[name] = _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
-    for name in ("closing", "parting", "lever"):
-        law[name] = quarter(found[0][name], f"{'lever arm' if name == 'lever' else 'tangential force'} of the {who}")
-    return MeasuredLaw(**law)
+        states, found = zip(*(bench.measure(each) for each in (first, deeper, heavier, smaller)), strict=True)
+    law: Law = {each: found[0][each] for each in ("mu", "mu_rolling")}
+    for each in POWERS:
+        law[each] = _power(f"{each.replace('_', ' ')} of the {who}", states, [values[each] for values in found])
+    for each in ("closing", "parting", "lever"):
+        law[each] = quarter(found[0][each], f"{'lever arm' if each == 'lever' else 'tangential force'} of the {who}")
+    return law
 
 
-def _power(what: str, states: Sequence[State], values: Sequence[float]) -> PowerOfOverlap:
-    """The power law of four values: of a contact, and with another overlap, other masses and other radii.
-
-    Raises
-    ------
-    NotTakenError
-        If the values follow no power law of the contact radius.
-    """
+def _power(what: str, states: tuple[State, ...], values: list[float]) -> PowerOfOverlap:
+    """The power law of four values: of a contact, and with another overlap, other masses and other radii."""
     if not any(values):
         return PowerOfOverlap(0.0)
     if min(values) <= 0:
         raise NotTakenError(f"The {what} changes its sign, which that of no contact law does.")
     first, deeper, heavier, smaller = states
-    ratios = (deeper.overlap / first.overlap, heavier.mass / first.mass, smaller.radius / first.radius)
-    by_depth, by_mass, by_size = (
-        quarter(np.log(value / values[0]) / np.log(ratio), what)
-        for value, ratio in zip(values[1:], ratios, strict=True)
-    )
+    ratios = deeper.overlap / first.overlap, heavier.mass / first.mass, smaller.radius / first.radius
+    measured = np.log(np.array(values[1:]) / values[0]) / np.log(ratios)
+    by_depth, by_mass, by_size = (quarter(each, what) for each in measured)
     if by_depth != by_size:
         raise NotTakenError(f"The {what} is no power of its contact radius.")
     factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
@@ -239,143 +144,134 @@ def quarter(value: float, what: str) -> float:
     return nearest
 
 
-def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, float]]:
-    """The numbers of a MeasuredLaw for one contact, from its forces at rest and in motion."""
-    state = bench.place_at(wanted)
-    fn, delta = bench.force()[0], state.overlap
-    if not fn > 0:
-        raise NotTakenError("A contact law has no normal force that pushes: it cannot be measured.")
-    # a time step so long that dashpots are weak beside slips
-    step = 1e3 * np.sqrt(state.mass * delta / fn)
-    bench.run(f"timestep {step:.17g}")
-    normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
-    rolling = _rolling(bench, wanted, fn, delta, step)
-    bench.place_at(wanted)
-    bench.move(slipping=1e60 * delta / step)  # far beyond Coulomb's bound, of the softest spring, too
-    bench.run("run 1 post no")
-    mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
-    if mu == 0:
-        none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
-        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none | rolling
-    ft, slip = _force_of_slip(bench, wanted, mu * fn, 1e-8 * min(mu, 1.0) * delta, step)
-    if rolling["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
-        _push_contact(bench, wanted, across=slip / step)
-    arm = abs(bench.array("torque")[0, Z] / bench.array("f")[0, Y])
-    lever = float(state.radii[0] - arm) / delta
-    parting, closing = _exponents(bench, ft, delta, step)
-    bench.place_at(wanted)
-    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, 0.01 * min(mu, 1.0) * delta / step)
-    return state, {
-        "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
-        "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
-    } | rolling  # fmt: skip
+class TwoParticleLammps:
+    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck.
 
+    The wall is a plane across x, wherever that of the fix is.
+    """
 
-def _rolling(bench: TwoParticleLammps, wanted: State, fn: float, delta: float, step: float) -> dict[str, float]:
-    """Stiffness, dashpot and bound of rolling friction, from rolling without slip for one step; zeros without any."""
+    def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
+        self.lammps = start_lammps(MPI.COMM_SELF, None)
+        self.types = (1,) if isinstance(name, str) else name
+        self.run(
+            f"units {lmp.extract_global('units')}", "atom_style sphere", "atom_modify map yes sort 0 0",
+            "boundary f f f", "newton on", "comm_modify vel yes", f"neighbor {size:.17g} bin",
+            "neigh_modify every 1 delay 0 check no",
+            f"region box block {f' {-40 * size:.17g} {40 * size:.17g}' * 3} units box",
+            f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
+            *["create_atoms 1 single 0 0 0 units box"] * len(self.types),
+            f"set group all diameter {2 * size:.17g} density 1", "run_style verlet", "group one id 1", *commands.pair,
+        )  # fmt: skip
+        if isinstance(name, str):
+            words = commands.fixes[name].split()
+            at = next(k for k, word in enumerate(words) if word in PLANES)
+            self.run(" ".join([*words[:2], "all", *words[3:at], "xplane 0 NULL", *words[at + 3 :]]))
 
-    def roll(way: float, *, rests: bool = True) -> float:
-        bench.place_at(wanted)
-        bench.move(rolling=way / step)
-        bench.run("run 1 post no")
-        if rests:
-            bench.rest()
-        return bench.force()[2]
+    def run(self, *lines: str) -> None:
+        """LAMMPS's commands."""
+        for line in lines:
+            self.lammps.command(line)
 
-    way = 1e-8 * delta
-    force = roll(way)
-    if force <= 1e-14 * fn:
-        return dict.fromkeys(("rolling", "rolling_dashpot", "mu_rolling"), 0.0)
-    bound = roll(1e3 * way * fn / force, rests=False)  # while it rolls on: the dashpot bears a part of the force
-    for _ in range(SLIP_TRIALS):
-        if force <= 0.1 * bound:
-            break
-        way *= 0.01 * bound / force
-        force = roll(way)
-    bench.place_at(wanted)
-    dashpot = _dashpot(bench, "rolling", bound, 0.01 * bound * way / (force * step))
-    return {"rolling": force / way, "rolling_dashpot": dashpot, "mu_rolling": bound / fn}
+    def array(self, name: str) -> Floats:
+        """An array of the particles, as LAMMPS has it."""
+        return np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)]
 
+    def place_at(self, state: State) -> None:
+        """Put the particles into a fresh contact, at rest; its overlap to the last digit is that of `state`."""
+        count, self.radius = len(self.types), state.radius
+        for away in (True, False):
+            self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
+            self.array("type")[:], self.array("x")[:] = self.types, 0.0
+            self.array("x")[0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
+            self.force()
+        self.state = state._replace(overlap=sum(state.radii) - self.array("x")[0, X])
 
-def _force_of_slip(
-    bench: TwoParticleLammps, wanted: State, bound: float, slip: float, step: float
-) -> tuple[float, float]:
-    """A tangential force far below Coulomb's bound, and its slip: LAMMPS's classic models forget most of a slip that
-    was cut at the bound."""
-    ft = _push_contact(bench, wanted, slipping=slip / step)
-    for _ in range(SLIP_TRIALS):
-        if ft <= 0.1 * bound:
-            break
-        slip *= 0.01 * bound / ft  # a stiff spring: once more, with less
-        ft = _push_contact(bench, wanted, slipping=slip / step)
-    if not 0 < ft <= 0.1 * bound:
-        raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
-    return ft, slip
+    def force(self, motion: int = CLOSING, speed: float = 0.0, across: float = 0.0, steps: int = 0) -> list[float]:
+        """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R, after
+        some steps of a motion: towards the other one, a rotation, as the speed of its surface, or one without slip, as
+        the effective radius times its rate; or with a velocity across. None of them moves the particles."""
+        v, omega, radius = self.array("v"), self.array("omega"), self.array("radius")[0]
+        v[:] = omega[:] = 0.0
+        rolls = speed / self.radius if motion == ROLLING else 0.0
+        v[0] = -speed if motion == CLOSING else 0.0, across + radius * rolls, 0.0
+        omega[0, Z] = (speed / radius if motion == SLIPPING else 0.0) + rolls
+        self.run(f"run {steps} post no")
+        f, torque = self.array("f")[0], self.array("torque")[0, Z]
+        return [float(f[X]), float(abs(f[Y])), float(abs(torque) / self.radius)]
 
+    def push(self, state: State, motion: int, speed: float, **across: float) -> float:
+        """The force at rest of a fresh contact that has moved for one step."""
+        self.place_at(state)
+        self.force(motion, speed, **across, steps=1)
+        return self.force()[motion]
 
-def _exponents(bench: TwoParticleLammps, ft: float, delta: float, step: float) -> tuple[float, float]:
-    """d ln f_t / d ln delta at constant slip while the contact parts and closes, in steps of a tenth of the overlap."""
-    forces, overlaps = [ft], [delta]
-    for direction in (-1.0, 1.0):
-        x, velocity = bench.array("x")[0, X], -direction * 0.1 * delta / step
-        bench.run(f"fix go one move linear {velocity:.17g} 0 0 units box", "run 1 post no", "unfix go")
-        bench.rest()
-        forces.append(bench.force()[1])
-        overlaps.append(overlaps[-1] + x - bench.array("x")[0, X])
-    parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
-    return float(parting), float(closing)
+    def measure(self, wanted: State) -> tuple[State, dict[str, float]]:
+        """The numbers of a law for one contact, from its forces at rest and in motion; and the contact."""
+        self.place_at(wanted)
+        state, fn = self.state, self.force()[CLOSING]
+        if not fn > 0:
+            raise NotTakenError("A contact law has no normal force that pushes: it cannot be measured.")
+        # a time step so long that dashpots are weak beside slips
+        delta, step = state.overlap, 1e3 * np.sqrt(state.mass * state.overlap / fn)
+        self.run(f"timestep {step:.17g}")
+        law = dict.fromkeys((*POWERS, "closing", "parting", "mu", "lever", "mu_rolling"), 0.0)
+        law |= {"stiffness": fn / delta, "normal_dashpot": self._dashpot(CLOSING, fn, 0.1 * delta / step)}
+        way = 1e-8 * delta
+        force = self.push(wanted, ROLLING, way / step)
+        if force > 1e-14 * fn:
+            self.place_at(wanted)
+            # while it rolls on: the dashpot bears a part of the force
+            bound = self.force(ROLLING, 1e3 * way * fn / force / step, steps=1)[ROLLING]
+            force, way = self._far_below(wanted, ROLLING, bound, force, way, step)
+            self.place_at(wanted)
+            dashpot = self._dashpot(ROLLING, bound, 0.01 * bound * way / (force * step))
+            law |= {"rolling": force / way, "rolling_dashpot": dashpot, "mu_rolling": bound / fn}
+        self.place_at(wanted)
+        # far beyond Coulomb's bound, of the softest spring, too; while the contact slides: dashpots bear a part
+        bound = self.force(SLIPPING, 1e60 * delta / step, steps=1)[SLIPPING]
+        mu = law["mu"] = bound / fn
+        if mu == 0:
+            return state, law
+        slip = 1e-8 * min(mu, 1.0) * delta
+        force, slip = self._far_below(wanted, SLIPPING, bound, self.push(wanted, SLIPPING, slip / step), slip, step)
+        if not 0 < force <= 0.1 * bound:
+            raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
+        if law["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
+            self.push(wanted, SLIPPING, 0.0, across=slip / step)
+        arm = abs(self.array("torque")[0, Z] / self.array("f")[0, Y])
+        law |= {"tangential": force / slip, "lever": float(state.radii[0] - arm) / delta}
+        forces, overlaps = [force], [delta]
+        for direction in (-1.0, 1.0):  # at constant slip, in steps of a tenth of the overlap
+            x, velocity = self.array("x")[0, X], -direction * 0.1 * delta / step
+            self.run(f"fix go one move linear {velocity:.17g} 0 0 units box", "run 1 post no", "unfix go")
+            forces.append(self.force()[SLIPPING])
+            overlaps.append(overlaps[-1] + x - self.array("x")[0, X])
+        exponents = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
+        law["parting"], law["closing"] = map(float, exponents)
+        self.place_at(wanted)
+        law["tangential_dashpot"] = self._dashpot(SLIPPING, bound, 0.01 * min(mu, 1.0) * delta / step)
+        return state, law
 
+    def _far_below(
+        self, wanted: State, motion: int, bound: float, force: float, way: float, step: float
+    ) -> tuple[float, float]:
+        """A force far below its bound, and the way that leads to it: LAMMPS's classic models forget most of a slip that
+        was cut at the bound."""
+        for _ in range(SLIP_TRIALS):
+            if force <= 0.1 * bound:
+                break
+            way *= 0.01 * bound / force  # a stiff spring: once more, with less
+            force = self.push(wanted, motion, way / step)
+        return force, way
 
-def _push_contact(bench: TwoParticleLammps, state: State, **speed: float) -> float:
-    """Tangential force at rest of a fresh contact that has moved at a speed for one step."""
-    bench.place_at(state)
-    bench.move(**speed)
-    bench.run("run 1 post no")
-    bench.rest()
-    return bench.force()[1]
-
-
-def _dashpot(
-    bench: TwoParticleLammps, direction: Literal["closing", "slipping", "rolling"], scale: float, speed: float
-) -> float:
-    """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
-    component = ("closing", "slipping", "rolling").index(direction)
-    bench.rest()
-    rest, found, force = bench.force()[component], 0.0, 0.0
-    for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
-        bench.move(**{direction: speed})
-        bench.run("run 0 post no")
-        force = bench.force()[component] - rest
-        found = force / speed
-        if 0.01 * scale < abs(force) < 0.5 * scale:
-            break
-        speed *= 0.1 * scale / abs(force) if abs(force) > 1e-9 * scale else 1e6
-        if abs(force) <= 1e-9 * scale and speed > 1e30:
-            break
-    return found if abs(force) > 1e-9 * scale else 0.0
-
-
-LAW_DIFFERENCE = 0.01
-"""Relative difference of a number from that of its line from which on it is remarked."""
-
-
-def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str, state: State) -> str | None:
-    """A sentence on what the law of a gran/*/history style, at a state, has of other numbers than its line; None if it
-    has the same. The line has k_n and k_t of k (R delta)^q, with q = 0 for hooke and q = 1/2 for hertz."""
-    words = commands.fixes[name].split()[4:] if isinstance(name, str) else commands.pair[0].split()[1:]
-    style = without_suffix(words[0]).removeprefix("gran/")
-    if style not in ("hooke/history", "hertz/history"):
-        return None
-    size = (state.radius * state.overlap) ** (0.5 if style.startswith("hertz") else 0.0)
-    kn, kt, mu = float(words[1]), 2 / 7 * float(words[1]) if words[2] == "NULL" else float(words[2]), float(words[5])
-    here = np.array(state.radius), np.array(state.overlap)
-    found = {"a normal stiffness": (law.stiffness.at(*here), kn * size), "a friction coefficient": (law.mu, mu)}
-    if law.mu:  # without friction there is no tangential force
-        found["a tangential stiffness"] = law.tangential.at(*here), kt * size
-    says = [
-        f"{what} {measured / said:.3g} times that of the line"
-        for what, (measured, said) in found.items()
-        if said > 0 and abs(measured / said - 1) > LAW_DIFFERENCE
-    ]
-    who = f"fix {name}" if isinstance(name, str) else f"Contacts of types {name[0]} and {name[1]}"
-    return f"{who}: LAMMPS has {' and '.join(says)} {' '.join(words)!r}, and K has LAMMPS's" if says else None
+    def _dashpot(self, motion: int, scale: float, speed: float) -> float:
+        """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of
+        scale."""
+        rest, found, force = self.force()[motion], 0.0, 0.0
+        for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
+            force = self.force(motion, speed)[motion] - rest
+            found = force / speed
+            if 0.01 * scale < abs(force) < 0.5 * scale or (abs(force) <= 1e-9 * scale and speed > 1e24):
+                break
+            speed *= 0.1 * scale / abs(force) if abs(force) > 1e-9 * scale else 1e6
+        return found if abs(force) > 1e-9 * scale else 0.0

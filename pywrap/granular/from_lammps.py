@@ -11,22 +11,17 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from ...analysis import Configuration
-from ...analysis.arrays import Floats, derive_frozen
-from .balance import BALANCE, check_balance, force_scale, held_remarks, lost_histories, motion_remarks, refuse_motion
+from ...analysis.arrays import derive_frozen
+from .balance import BALANCE, check_balance, force_scale, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, without_suffix
-from .look_in_a_copy import DRAG_STYLES, can_copy, in_a_copy, open_files, require_instance
-from .looks import look
-from .motion_proof import (
-    LARGEST_DIFFERENCE,
-    SMALL_DIFFERENCE,
-    NotProvedError,
-    OtherStiffnessError,
-    check_holding,
-    push_remark,
-)
+from .look_in_a_copy import DRAG_STYLES, in_a_copy, open_files, require_instance
+from .looks import Looked, acting_fixes, look, may_act
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError
 from .motion_proof import prove as prove_motion
 
 
@@ -34,34 +29,30 @@ def from_lammps(
     lmp: Any,
     commands: Iterable[str] | Commands | None = None,
     *,
-    slides: bool = False,
     balance: float = BALANCE,
     prove: bool = True,
     differences: bool = False,
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look. On several ranks, or with the
-    threads of `package omp`, LAMMPS itself runs zero steps: fixes and variables that these would change are refused by
-    their names before.
+    The instance does not change: its next run is the same to the bit as without the look, which is taken in a copy of
+    the process.
 
     Parameters
     ----------
     lmp : lammps.lammps
-        The instance: disks or spheres at rest. Laws are measured with gran/hooke/history, gran/hertz/history, granular
-        or mindlin/smooth, between planes of fix wall/gran or in a periodic box. On several ranks all make this call.
+        The instance: disks or spheres at rest, on one rank and one thread. Laws are measured with gran/hooke/history,
+        gran/hertz/history, granular or mindlin/smooth, between planes of fix wall/gran or in a periodic box.
     commands : iterable of str, optional
         The lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck; by default those in the
         instance's log.
-    slides : bool
-        Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
         Residual that is allowed, as a share of the mean contact force; not negative.
     prove : bool
         Whether five steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
         `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
-        1e-3 is refused, and 1e-5 or less is usual. `proof` is None on several ranks or with threads, where no copy can
-        be made, and for a packing whose residual exceeds the default balance.
+        1e-3 is refused, and 1e-5 or less is usual. `proof` is None for a packing whose residual exceeds the default
+        balance.
     differences : bool
         Whether K and C are found by differences of LAMMPS's forces even where all laws of contacts are measured.
 
@@ -69,14 +60,14 @@ def from_lammps(
     -------
     Configuration
         With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
-        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out, and
-        say why differences are taken.
+        C by differences of forces. Its `remarks` name the drag and the velocities that are left out, and say why
+        differences are taken.
 
     Raises
     ------
     NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
-        those of the instance; or LAMMPS's forces do not change as K says; or the look would change the next run.
+        those of the instance; or LAMMPS's forces do not change as K says; or the process cannot be copied.
 
     Examples
     --------
@@ -87,7 +78,7 @@ def from_lammps(
     >>> faultgouge.from_lammps(crystal).contacts
     <LinearisedContacts: 648, 0 of them with walls>
     """
-    return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
+    return take_configuration(lmp, commands, {}, balance=balance, prove=prove, differences=differences)
 
 
 def take_configuration(
@@ -95,9 +86,8 @@ def take_configuration(
     commands: Iterable[str] | Commands | None,
     laws: KnownLaws,
     *,
-    slides: bool,
-    balance: float,
-    prove: bool,
+    balance: float = np.inf,
+    prove: bool = False,
     differences: bool = False,
 ) -> Configuration:
     """As :func:`from_lammps`, with known laws: these are not measured again, and new ones are added to them."""
@@ -107,98 +97,62 @@ def take_configuration(
     try:
         if differences:
             raise NotLinearisedError("They are asked for.")
-        found = _by_laws(lmp, given, laws, balance=balance, prove=prove)
+        return _by_laws(lmp, given, laws, balance=balance, prove=prove)
     except NotLinearisedError as error:
-        found = _instead_of_laws(lmp, given, error, slides=slides, balance=balance, prove=prove)
-    if slides:
-        return derive_frozen(found, contacts=derive_frozen(found.contacts, sliding=found.contacts.at_bound))
-    return found
-
-
-def _instead_of_laws(
-    lmp: Any, given: Commands | None, reason: NotLinearisedError, *, slides: bool, balance: float, prove: bool
-) -> Configuration:
-    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
-    why = str(reason).rstrip(".")
-    if not can_copy(lmp):
-        raise NotLinearisedError(
-            f"{why}; or take one rank and one thread, where K is found by differences of forces."
-        ) from reason
-    if slides:
-        raise NotTakenError(
-            f"{why}; so K is found by differences of forces, which have no choice between sticking and sliding "
-            "contacts: leave slides out."
-        ) from reason
-    try:
-        found = _by_differences(lmp, given, balance=balance, prove=prove)
-    except NotTakenError:
-        if isinstance(reason, NotProvedError):
-            raise reason from None
-        raise
-    found = derive_frozen(found, remarks=(f"K and C are differences of LAMMPS's forces: {why}", *found.remarks))
-    if not isinstance(reason, NotProvedError):
-        return found
-    # differences lack forces on velocities, or between particles far apart, too, and these have been named
-    close = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
-    if close and found.operator_error <= SMALL_DIFFERENCE:
-        return found
-    # contacts that slide on one side have no linear motion, and no verdict is given
-    if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
-        return found
-    raise reason
+        return _instead_of_laws(lmp, given, error, balance=balance, prove=prove)
 
 
 def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
-    work = partial(look, lmp, given, open_files())
-    deck, fixes, found = in_a_copy(work) if can_copy(lmp) else work()
+    looked = in_a_copy(partial(look, lmp, given, open_files()))
     try:
-        configuration = configuration_by_laws(lmp, deck, found, laws)
+        found = configuration_by_laws(lmp, looked, laws)
     except ValueError as error:  # numbers that no contact at rest has
-        advice = lost_histories(deck) or "bring it to rest by faultgouge.relax(lmp), in a command --relax"
+        advice = "bring it to rest by faultgouge.relax(lmp), in a command --relax"
         raise NotTakenError(f"The packing moves: {str(error).rstrip('.')}; {advice}.") from error
-    remarks = _remarks(lmp, configuration, fixes, found["v"], found["omega"])
-    configuration = derive_frozen(configuration, remarks=(*configuration.remarks, *remarks))
-    contacts = configuration.contacts
-    rests = not configuration.residual > BALANCE * force_scale(configuration)
-    proves = prove and can_copy(lmp) and rests
-    if not proves:
-        check_holding(fixes)
-    check_friction(contacts, rests=rests)
-    refuse_motion(configuration, balance, deck)
-    return _proved(lmp, configuration, deck, fixes) if proves else configuration
+    rests = not found.residual > BALANCE * force_scale(found)
+    if not (prove and rests):  # no motion can show whether these act
+        held = {name: style for name, style in looked.fixes.items() if style.startswith(("spring", "indent"))}
+        if acts := acting_fixes(held, looked.commands):
+            raise NotLinearisedError(f"{may_act(acts)}.")
+    check_friction(found.contacts, rests=rests)
+    return _at_rest(lmp, found, looked, balance=balance, prove=prove)
 
 
-def _remarks(
-    lmp: Any, configuration: Configuration, fixes: dict[str, str], velocity: Floats, rotation: Floats
-) -> tuple[str, ...]:
-    """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
-    held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    of_fixes = []
-    for name, style in fixes.items():
+def _instead_of_laws(
+    lmp: Any, given: Commands | None, reason: NotLinearisedError, *, balance: float, prove: bool
+) -> Configuration:
+    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
+    why = str(reason).rstrip(".")
+    unproved = reason if isinstance(reason, NotProvedError) else None
+    try:
+        start, looked = still_particles(lmp, given)
+        found = _at_rest(lmp, configuration_by_differences(lmp, start, looked), looked, balance=balance, prove=prove)
+    except NotTakenError:
+        if unproved is None:
+            raise
+        raise unproved from None
+    # differences lack forces on velocities, or between particles far apart, too
+    exact = found.proof is not None and found.proof <= LARGEST_DIFFERENCE and found.operator_error <= SMALL_DIFFERENCE
+    # contacts that slide on one side have no linear motion, and no verdict is given
+    if unproved is not None and not exact and not len(found.one_sided_particles):
+        raise unproved
+    return derive_frozen(found, remarks=(f"K and C are differences of LAMMPS's forces: {why}", *found.remarks))
+
+
+def _at_rest(lmp: Any, made: Configuration, looked: Looked, *, balance: float, prove: bool) -> Configuration:
+    """A Configuration at rest with its proof, and remarks on what moves in LAMMPS, or may change."""
+    v, omega, timestep = looked.found["v"], looked.found["omega"], float(lmp.extract_global("dt"))
+    remarks = list(motion_remarks(made, v, omega, timestep))
+    for name, style in looked.fixes.items():
         if style.startswith("adapt"):
             says = "may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
-            of_fixes.append(f"fix {name} (adapt) {says}")
+            remarks.append(f"fix {name} (adapt) {says}")
         elif without_suffix(style).startswith(DRAG_STYLES):
-            of_fixes.append(f"drag of fix {name} ({style}) is left out")
-    return (*held, *motion_remarks(configuration, velocity), *of_fixes)
-
-
-def _proved(lmp: Any, made: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
-    """A Configuration with its proof."""
-    return derive_frozen(made, proof=prove_motion(lmp, made, fixes, extrapolates=commands.style == OWN))
-
-
-def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:
-    """A Configuration whose K and C are differences of LAMMPS's forces, on one rank."""
-    still = still_particles(lmp, given)
-    made = configuration_by_differences(lmp, still)
-    made = derive_frozen(made, remarks=_remarks(lmp, made, still.fixes, still.velocity, still.rotation))
-    refuse_motion(made, balance, still.commands)
-    proves = prove and made.residual <= BALANCE * force_scale(made)
-    if not proves:
+            remarks.append(f"drag of fix {name} ({style}) is left out")
+    refuse_motion(made, balance, looked.commands)
+    made = derive_frozen(made, remarks=tuple(remarks))
+    if not prove or made.residual > BALANCE * force_scale(made):
         return made
-    made = _proved(lmp, made, still.commands, still.fixes)
-    if not len(made.one_sided_particles):
-        return made
-    return derive_frozen(made, remarks=(*made.remarks, push_remark(lmp, made)))
+    others = may_act(acting_fixes(looked.fixes, looked.commands))
+    return derive_frozen(made, proof=prove_motion(lmp, made, others, extrapolates=looked.commands.style == OWN))

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Configuration, Packing, Stability, stable_timestep
+from ...analysis import Configuration, Stability, stable_timestep
 from ...analysis.motion.pushes import random_pushes
 from ...analysis.progress import report_progress
 from .lammps_arrays import owned_array, rows_of, set_velocity
-from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .look_in_a_copy import in_a_copy, quieten, require_instance
 
 STEP_SHARE = 0.1
 """Time step, as a share of the largest stable one."""
@@ -51,7 +51,7 @@ NO_LAMMPS = (
 """Where a file holds particles and contacts alone."""
 
 
-def follow_by(packing: Packing | Configuration, lmp: Any = None) -> Callable[[Stability], Stability]:
+def follow_by(packing: Any, lmp: Any = None) -> Callable[[Stability], Stability]:
     """What adds to a verdict where the motion that grows ends: `Stability.follow`.
 
     Parameters
@@ -63,31 +63,27 @@ def follow_by(packing: Packing | Configuration, lmp: Any = None) -> Callable[[St
     """
 
     def follow(told: Stability) -> Stability:
-        c = packing.configuration
-        if lmp is not None and not can_copy(lmp):
-            why = "LAMMPS goes on in a copy of the process, which takes one rank and one thread"
-            return replace(told, remarks=(*told.remarks, why))
+        c, step = packing.configuration, STEP_SHARE * float(stable_timestep(packing))
         if lmp is not None:
-            return replace(told, follow=in_a_copy(lambda: _ends_in_a_copy(told, c, lmp)))
-        if not isinstance(packing, Packing):
+            require_instance(lmp, "stability")
+
+            def in_lammps() -> dict[str, Any]:
+                lmp.command("log none")
+                quieten(lmp, drag=True)
+                lmp.command(f"timestep {step:.17g}")
+                return _ends(told, c, lmp, step)
+
+            return replace(told, follow=in_a_copy(in_lammps))
+        if packing is c:
             return replace(told, remarks=(*told.remarks, NO_LAMMPS))
         from mpi4py import MPI
 
         from ..lammps.engine import Engine
 
-        step = STEP_SHARE * float(stable_timestep(packing))
         with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step):
             return replace(told, follow=_ends(told, c, engine.lammps, step))
 
     return follow
-
-
-def _ends_in_a_copy(told: Stability, c: Configuration, lmp: Any) -> dict[str, Any]:
-    lmp.command("log none")
-    quieten(lmp, drag=True)
-    step = STEP_SHARE * float(stable_timestep(c))
-    lmp.command(f"timestep {step:.17g}")
-    return _ends(told, c, lmp, step)
 
 
 def _ends(told: Stability, c: Configuration, lmp: Any, step: float) -> dict[str, Any]:

@@ -17,7 +17,8 @@ import signal
 import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import recv_handle, send_handle
@@ -33,13 +34,11 @@ from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...parent_death import end_with, outlive
 from ..load_path import LoadPath
 from .balance import check_balance
-from .configuration_by_laws import KnownLaws
 from .from_lammps import take_configuration
-from .granular_commands import NotTakenError
-from .lammps_arrays import owned_array
+from .granular_commands import NotTakenError, read_commands
+from .lammps_arrays import by_id
 from .look_in_a_copy import (
     OpenFile,
-    can_copy,
     explain_error,
     in_a_copy,
     interrupts_wait,
@@ -60,7 +59,6 @@ def lammps_path(
     apply: Callable[[Any, float], object] | str,
     *,
     commands: Iterable[str] | None = None,
-    slides: bool = False,
     balance: float = REST_SHARE,
     steps: int = 1_000_000,
 ) -> "LoadPath[RelaxedCopy]":
@@ -78,7 +76,7 @@ def lammps_path(
     apply : callable or str
         ``apply(lmp, value)`` sets the load, whatever was set before; or the name of a variable of style equal or
         internal, on which a fix of the deck depends.
-    commands, slides
+    commands : iterable of str, optional
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
         Largest residual at rest, as a share of the mean contact force; not negative.
@@ -97,11 +95,10 @@ def lammps_path(
         come to rest.
     """
     require_instance(lmp, "lammps_path")
-    if not can_copy(lmp):
-        raise NotTakenError("lammps_path keeps copies of the process: use one rank and one thread.")
     check_balance(balance)
-    given = None if commands is None else list(commands)
-    return LoadPath(CopiesSolver(_Relaxation(lmp, apply, given, slides, balance, steps)))
+    given = None if commands is None else read_commands(commands)
+    look = partial(take_configuration, lmp, given, {})
+    return LoadPath(CopiesSolver(_Relaxation(lmp, apply, look, balance, steps)))
 
 
 @dataclass(eq=False)
@@ -134,7 +131,7 @@ class CopiesSolver:
         there.close()
 
     def solve(self, load: float, below: RelaxedCopy | None, beside: RelaxedCopy | None, ahead: bool) -> RelaxedCopy:
-        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`: only a copy that is `ahead` waits for more."""
+        """As of :class:`~faultgouge.pywrap.load_path.LoadPath`: only a copy that is `ahead` waits for more."""
         if not self._end.alive:
             raise NotTakenError("The path is closed: ask it inside of its `with` block, or make a new one.")
         here, found = _ask(self._process_of(below), load)
@@ -147,7 +144,7 @@ class CopiesSolver:
         made = RelaxedCopy(found, here)
         if ahead:
             self._ahead.append(made)
-            self._end_some()
+            self._end_some(made)
         else:
             here.close()
         return made
@@ -162,10 +159,10 @@ class CopiesSolver:
             self._end_some(wanted)
         return wanted.process
 
-    def _end_some(self, kept: RelaxedCopy | None = None) -> None:
-        """End every second copy where there are too many, but for the last one."""
+    def _end_some(self, kept: RelaxedCopy) -> None:
+        """End every second copy where there are too many, but for one and the last one."""
         waits = [each for each in self._ahead if each.process is not None]
-        for each in waits[:-1:2] if len(waits) > MOST_COPIES else []:
+        for each in waits[:-1:2] if len(waits) > MOST_COPIES else ():
             if each is not kept and each.process is not None:
                 each.process.close()
                 each.process = None
@@ -237,8 +234,7 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, 
 
 def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
-    before = log_file(lmp, files)
-    if before is not None:
+    if before := log_file(lmp, files):
         own = folder / f"log.{os.getpid()}"
         shutil.copyfile(before.path, own)
         lmp.command(f'log "{own}" append')
@@ -246,27 +242,29 @@ def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
 
 @dataclass
 class _Relaxation:
-    """LAMMPS and how it comes to rest; fields as of `lammps_path`, and what copies of this process have, too."""
+    """LAMMPS and how it comes to rest; `look` takes the packing as it stands, and the other fields are as of
+    `lammps_path`, and what copies of this process have, too."""
 
     lmp: Any
     apply: Callable[[Any, float], object] | str
-    commands: list[str] | None
-    slides: bool
+    look: Callable[..., Configuration]
     balance: float
     steps: int
-    laws: KnownLaws = field(default_factory=dict)
     found: Configuration | None = None  # the equilibrium where LAMMPS stands
     rate: float = DRAG_RATE
 
     def result(self, value: float) -> Configuration | FaultgougeError:
         """The equilibrium at a value, by a run with drag until the packing rests; or why there is none."""
+        lmp, first = self.lmp, self.found is None
         try:
             self.set(value)
             found, self.rate = bring_to_rest(
-                self.lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
+                lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
             )
-            # the first of all others, which are forked from it
-            self.found = found = self.look(prove=True) if self.found is None else found
+            if first:  # all others are forked from it; a proof may show that laws do not serve
+                found = self.look(prove=True)
+                self.look = partial(self.look, differences=found.operators == "differences")
+            self.found = found
             change = in_a_copy(lambda: self.force_change(value))
         except FaultgougeError as error:
             return error
@@ -292,22 +290,13 @@ class _Relaxation:
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 
-    def look(self, *, prove: bool = False) -> Configuration:
-        """The packing as it stands, moving or not."""
-        # a proof may have shown at the first load that laws do not serve
-        differences = self.found is not None and self.found.operators == "differences"
-        return take_configuration(
-            self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf, prove=prove, differences=differences
-        )
-
     def force_change(self, value: float) -> float:
         """Largest change of a force per value, of particles that stay where they are."""
-        step = 1e-4 * max(abs(value), 1e-2)
-        forces = []
+        step, forces = 1e-4 * max(abs(value), 1e-2), []
         for each in (value, value + step):
             self.set(each)
             self.lmp.command("run 0 post no")
-            forces.append(owned_array(self.lmp, "f")[np.argsort(owned_array(self.lmp, "id"))])
+            forces += by_id(self.lmp, "f")
         change = float(np.linalg.norm(forces[1] - forces[0], axis=1).max())
         # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0

@@ -1,15 +1,12 @@
-"""A LAMMPS instance of a user: its ranks, styles and log, and looks in a copy of the process (`fork`).
+"""A LAMMPS instance of a user: its styles and its log, and looks in a copy of the process (`fork`).
 
 LAMMPS hands out contacts only in a run. A run of zero steps sorts particles, may cut a history once more at Coulomb's
 bound, and scales rescaled histories. In a copy of the process all of this may happen: the instance itself stays as it
-is.
+is. Several ranks, and threads, cannot be copied.
 
 **Files.** The copy shares open files with the process, with the positions at which they are written. So the copy first
 puts the null device in the place of every file that is open for writing, whoever has opened the file. All that LAMMPS,
 zlib or Python write as they close a dump or a log then goes nowhere.
-
-**No copy** is possible on several ranks, since a copy cannot communicate with the other ranks, or with threads, which a
-copy does not have (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
 """
 
 import ctypes
@@ -22,30 +19,38 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
-from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, NamedTuple, NoReturn, TypeVar
+from typing import IO, Any, NamedTuple, TypeVar
 
 from mpi4py import MPI
 
 from ...parent_death import end_with
 from .granular_commands import NotTakenError
 
+Found = TypeVar("Found")
+
+PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "record")
+"""Fixes that write or change something in a run, whatever moves, by the beginnings of their styles."""
+
+INSERTS = ("pour", "deposit", "evaporate")
+"""Fixes that put particles in or take them out, with which no time step may be changed."""
+
+DRAG_STYLES = ("viscous", "langevin", "overdamped", "damping/cundall")
+"""Fixes that take energy away, and may shake."""
+
 
 def require_instance(lmp: Any, caller: str) -> None:
-    """Refuse what is no LAMMPS instance, and a closed instance."""
+    """Refuse what is no LAMMPS instance, a closed instance, and one that cannot be copied."""
     if not hasattr(lmp, "extract_setting"):
         raise NotTakenError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")
     if getattr(lmp, "lmp", None) is None:
         raise NotTakenError(f"{caller} takes an open instance, and this one is closed: call {caller} before close().")
-
-
-def communicator(lmp: Any) -> MPI.Comm:
-    """The ranks of an instance."""
-    if lmp.extract_setting("world_size") == 1:
-        return MPI.COMM_SELF
-    return getattr(lmp, "comm", None) or MPI.COMM_WORLD
+    if MPI.COMM_WORLD.size > 1 or lmp.extract_setting("nthreads") > 1 or not hasattr(os, "fork"):
+        raise NotTakenError(
+            f"{caller} looks at LAMMPS in a copy of the process, which several ranks or threads cannot have: use one "
+            "rank and one thread, as by a restart file that the run has written."
+        )
 
 
 class Styles(NamedTuple):
@@ -58,20 +63,15 @@ class Styles(NamedTuple):
 
 
 def styles_of(lmp: Any) -> Styles:
-    """The styles of an instance, as LAMMPS's `info` says them."""
-    info = said(lmp, "fixes system")
+    """The styles of an instance, as LAMMPS's `info` says them on all ranks."""
+    with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
+        lmp.command(f'info fixes system out overwrite "{name_of(answer)}"')
+        info = MPI.COMM_WORLD.bcast(answer.read(), root=0)
     fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", info, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", info, re.MULTILINE))
     # Atoms = N, types = T, style = the pair style
     styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
-
-
-def said(lmp: Any, topics: str) -> str:
-    """What LAMMPS's command `info` says, on all ranks."""
-    with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
-        lmp.command(f'info {topics} out overwrite "{name_of(answer)}"')
-        return communicator(lmp).bcast(answer.read(), root=0)
 
 
 def of_lammps(error: BaseException) -> bool:
@@ -122,49 +122,15 @@ def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
     return closed[0] if len(closed) == 1 else None
 
 
-def log_of(lmp: Any, files: dict[int, OpenFile]) -> list[str] | None:
-    """The lines of an instance's log, as of :func:`log_file`."""
-    file = log_file(lmp, files)
-    return None if file is None else _lines_of(file)
-
-
-def only_log() -> list[str] | None:
-    """The lines of the only open log of this process; None if there is none, or there are several."""
-    found = {}
-    for file in open_files().values():
-        with suppress(OSError), open(file.path, "rb") as stream:
-            if stream.read(8) == b"LAMMPS (":
-                found[file.path] = file
-    return _lines_of(*found.values()) if len(found) == 1 else None
-
-
-def _lines_of(log: OpenFile) -> list[str]:
-    """The lines of a log; a NotTakenError where another LAMMPS writes to the same file."""
+def text_of(log: OpenFile) -> str:
+    """The text of a log; a NotTakenError where another LAMMPS writes to the same file."""
     text = Path(log.path).read_text(errors="replace")
     if "\0" in text or os.path.getsize(log.path) != log.place:
         raise NotTakenError(
             f"{log.path} is the log of another LAMMPS, too: give each LAMMPS a log of its own (-log FILE), or the "
             f"lines as from_lammps(lmp, commands=[...])."
         )
-    return text.splitlines()
-
-
-Found = TypeVar("Found")
-
-PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "record")
-"""Fixes that write or change something in a run of zero steps, by the beginnings of their styles."""
-
-INSERTS = ("pour", "deposit", "evaporate")
-"""Fixes that put particles in or take them out, with which no time step may be changed."""
-
-DRAG_STYLES = ("viscous", "langevin", "overdamped", "damping/cundall")
-"""Fixes that take energy away, and may shake."""
-
-
-def can_copy(lmp: Any) -> bool:
-    """Whether the process can be copied: one rank, one thread."""
-    threads = lmp.extract_setting("nthreads")
-    return hasattr(os, "fork") and MPI.COMM_WORLD.size == 1 and threads <= 1
+    return text
 
 
 def silent_copy(*keep: int) -> int:
@@ -174,15 +140,10 @@ def silent_copy(*keep: int) -> int:
     """
     ctypes.CDLL(None).fflush(None)  # buffered text would be written twice
     child = os.fork()
-    if child == 0:
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-        _silence(keep)
-    return child
-
-
-def _silence(keep: tuple[int, ...]) -> None:
-    """Put the null device in the place of all files, pipes and terminals that are open for writing."""
+    if child:
+        return child
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in map(int, os.listdir("/dev/fd")):
         with suppress(OSError):  # the file of the list itself is closed
@@ -193,6 +154,7 @@ def _silence(keep: tuple[int, ...]) -> None:
                 os.dup2(nowhere, descriptor)
     for descriptor in (1, 2):
         os.dup2(nowhere, descriptor)
+    return 0
 
 
 def in_a_copy(work: Callable[[], Found]) -> Found:
@@ -206,11 +168,18 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     """
     here, there = Pipe(duplex=False)
     this, child = os.getpid(), 0
+    found: Any
     try:
         with interrupts_wait():
             child = silent_copy(there.fileno())
             if child == 0:
-                _send_and_end(work, there, this)
+                try:
+                    end_with(this)
+                    there.send(work())
+                except Exception as error:  # whatever it is, the process says it
+                    there.send(NotTakenError(explain_error(error)) if of_lammps(error) else error)
+                finally:
+                    os._exit(0)
         there.close()
         found = here.recv()
     except EOFError:
@@ -224,17 +193,6 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     if isinstance(found, Exception):
         raise found
     return found
-
-
-def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> NoReturn:
-    """The life of a copy: its work, and what it has found for the parent."""
-    try:
-        end_with(parent)
-        there.send(work())
-    except Exception as error:  # whatever it is, the parent says it
-        there.send(NotTakenError(explain_error(error)) if of_lammps(error) else error)
-    finally:
-        os._exit(0)
 
 
 @contextmanager

@@ -1,17 +1,20 @@
-"""Particles, contacts and fixes of a LAMMPS instance, read in a copy of the process if there can be one."""
+"""Particles, contacts and fixes of a LAMMPS instance, read in a copy of the process.
 
-import re
-from contextlib import nullcontext, suppress
-from typing import Any
+Contacts between particles are those of compute pair/local at rest. What a wall exerts is what is missing without it.
+
+**Forces that follow the time.** Where nothing moves, no force of contacts changes. If forces change in some steps of
+particles that stay, a load or a wall follows a variable, and no packing rests.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
-from .balance import moving_region
+from .balance import TWICE, touch_twice
 from .granular_commands import (
     BODIES,
-    GIVE_LINE,
     GIVE_LINES,
     HOLDS,
     MOBILE,
@@ -22,133 +25,125 @@ from .granular_commands import (
     NotLinearisedError,
     NotTakenError,
     check_fixes,
-    check_pair,
     read_commands,
     rolls,
+    unmeasured_pair,
     without_suffix,
 )
-from .lammps_arrays import Arrays, arrays_at_rest, forces_in_order, given_back
-from .look_in_a_copy import OpenFile, Styles, can_copy, communicator, log_of, only_log, quieten, said, styles_of
-from .mobility import translating_bodies
+from .lammps_arrays import by_id, owned_array
+from .look_in_a_copy import (
+    DRAG_STYLES,
+    INSERTS,
+    PER_STEP,
+    OpenFile,
+    Styles,
+    log_file,
+    quieten,
+    styles_of,
+    text_of,
+)
+from .mobility import Mobility, mobility, translating_bodies
 
-BY_CONTACT = ("contacts", "partners")
-"""Arrays with a row for each contact; all others have one for each particle."""
+Arrays = dict[str, Any]
 
-STILL = (
-    *WALLS, *MOBILE, "gravity", "viscous", "enforce2d", "slip/history", "low/parts", "dashpot/velocities", "store",
-    "keep/histories", "property/atom", "addforce", "spring", "indent", "halt", "adapt", "restrain", "NEIGH_HISTORY",
-    "DUMMY", "OMP",
+STILL_STEPS = 20
+"""Steps in which particles that stay still feel the same forces."""
+
+FOLLOWS_TIME = 1e-7
+"""Change of a force in these steps, as a share of the largest force, from which on a force follows the time. A model
+that acts one step late changes forces in the first step, which is not among them."""
+
+
+PASSIVE = (
+    *WALLS, *PER_STEP, *DRAG_STYLES, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
+    "dashpot/velocities", "keep/histories", "store", "property/atom",
 )  # fmt: skip
-"""Fixes, by the beginnings of their styles, to which zero steps without velocities do nothing that lasts."""
-
-SETTING = ("setforce", "aveforce", "lineforce", "planeforce")
-"""Fixes that set forces, of which the force of a wall is then no difference."""
-
-
-def look(
-    lmp: Any, given: Commands | None, files: dict[int, OpenFile], columns: str = ""
-) -> tuple[Commands, dict[str, str], Arrays]:
-    """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
-    there can be one.
-
-    With `columns` of compute pair/local, whatever exerts forces is taken: contacts with walls are not looked at one by
-    one, and "at walls" has the sizes of the forces of all walls on each particle, shape (N,).
-    """
-    world, copied = communicator(lmp), can_copy(lmp)
-    if given is None:
-        lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
-        if lines is None:
-            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
-        given = read_commands(lines, log=True)
-    elif copied:
-        lmp.command("log none")
-    styles = styles_of(lmp)
-    with suppress(NotLinearisedError) if columns else nullcontext():
-        check_instance(lmp, styles, given)
-    plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
-    if columns:
-        _check_motion(lmp, plain, given)
-    mobile = {name: given.fixes[name] for name, style in plain.items() if style in MOBILE}
-    groups = {name: line.split()[2] for name, line in mobile.items()}
-    for name in [name for name in mobile if plain[name] in BODIES]:
-        bodies = translating_bodies(mobile[name], lmp.extract_setting("dimension"))
-        groups |= {f"{name} {body.group}": body.group for body in bodies}
-    if copied:
-        quieten(lmp, drag=True)
-    else:
-        _refuse_changes(lmp, styles, given)
-    walls = [name for name, style in plain.items() if (style.startswith("wall/gran") if columns else style in WALLS)]
-    silent = _silent_walls(walls, given)
-    usual = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
-    if any(map(rolls, given.pair)):
-        usual += " p5 p6 p7"
-    with nullcontext() if copied else given_back(lmp):
-        mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns or usual)
-    for name in walls:
-        if name not in silent and plain[name].startswith("wall/gran"):
-            mine[f"wall {name}"] = mine[f"wall {name}"][:, 1:4]
-    # what a wall exerts is what is missing without the wall, and without fixes that set forces
-    apart = [name for name in walls if name in silent or (not columns and rolls(given.fixes[name]))]
-    acts = {each: mine[each] for each in ("f", "torque")}
-    for name in [*(name for name in plain if apart and plain[name] in SETTING), *apart]:
-        lmp.command(f"unfix {name}")
-        lmp.command("run 0 post no")
-        now = {each: forces_in_order(lmp, mine["id"], each) for each in acts}
-        if name in apart:
-            mine[f"wall {name}"] = acts["f"] - now["f"] if name in silent else mine[f"wall {name}"]
-            mine[f"torque {name}"] = acts["torque"] - now["torque"]
-        acts = now
-    if columns:
-        forces = [mine.pop(f"wall {name}") for name in walls]
-        mine["at walls"] = np.linalg.norm(sum(forces, np.zeros_like(mine["f"])), axis=1)
-    every = world.allgather(mine)
-    found = {}
-    for name in mine:  # the array of a rank without rows may have another number of columns
-        parts = [each[name] for each in every]
-        found[name] = np.concatenate([part for part in parts if len(part)] or parts[:1])
-    order = np.argsort(found["id"], kind="stable")
-    return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+"""Fixes, by the beginnings of their styles, whose action is in K, or constant, or none; so are those that LAMMPS makes
+for itself, whose styles are in capitals (GRANULAR/MDR), and `addforce` without a variable. The list only explains a
+difference: the motion shows it."""
 
 
-def _check_motion(lmp: Any, plain: dict[str, str], given: Commands) -> None:
-    """Refuse fixes that move or hold particles in a way that is not known, and walls that move."""
-    for name, style in plain.items():
-        if not style.startswith((*MOVES, *HOLDS)):
-            continue
-        if style not in MOBILE:
-            raise NotTakenError(
-                f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
-            )
-        if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != style:
-            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
-    if moves := moving_region(lmp, given):
-        raise NotTakenError(moves)
+COLUMNS = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
+"""What compute pair/local may hand out of contacts: branch vectors, and forces."""
 
 
-def members_of(found: Arrays) -> dict[str, NDArray[np.bool_]]:
-    """Who is in the group of each fix that moves or holds particles, and in the bodies of a fix rigid."""
-    return {name.removeprefix("group "): each for name, each in found.items() if name.startswith("group ")}
+class Looked(NamedTuple):
+    """The commands of an instance, the styles of its fixes by ID, its arrays in the order of the particles' IDs, and
+    what moves."""
+
+    commands: Commands
+    fixes: dict[str, str]
+    found: Arrays
+    moved: Mobility
 
 
-def _refuse_changes(lmp: Any, styles: Styles, commands: Commands) -> None:
-    """Refuse a look by zero steps of the instance itself where they would change what is not given back: before any."""
-    cold = [name for name, line in commands.fixes.items() if set(line.split()[4:6]) <= {"0", "0.0"}]
-    changes = [
-        f"fix {name} {style}"
-        for name, style in styles.fixes.items()
-        if not without_suffix(style).startswith(STILL) and not (style.startswith("langevin") and name in cold)
+def acting_fixes(styles: dict[str, str], commands: Commands) -> dict[str, str]:
+    """The fixes, by ID and style, that may exert other forces than contacts do, and no constant ones."""
+    plain = {name: without_suffix(style) for name, style in styles.items()}
+    constant = [
+        name for name, style in plain.items() if style == "addforce" and "v_" not in commands.fixes.get(name, "v_")
     ]
-    variables = re.findall(r"(?m)^Variable\[ *\d+\]: *(\w+),.*\b(?:random|normal)\(", said(lmp, "variables"))
-    if changes := [*changes, *(f"variable {name}" for name in variables)]:
-        raise NotTakenError(
-            "On several ranks or with threads a look runs zero steps of LAMMPS itself, by which "
-            f"{' and '.join(changes)} may write, count or draw random numbers, so that the next run would be another "
-            "one: take one rank and one thread, where the look is in a copy, or unfix or delete what is named."
+    return {
+        name: style
+        for name, style in plain.items()
+        if not (style.startswith(PASSIVE) or style.isupper() or name in constant)
+    }
+
+
+def may_act(fixes: dict[str, str]) -> str:
+    """What is said of such fixes; empty if there are none."""
+    says = "may act on particles as contacts do not tell: leave it out, or have it exert a constant force"
+    return " and ".join(f"fix {name} {style}" for name, style in fixes.items()) + f" {says}" * bool(fixes)
+
+
+def look(lmp: Any, given: Commands | None, files: dict[int, OpenFile], *, whole: bool = False) -> Looked:
+    """Look at an instance that is a copy; `files` are the open files of the process.
+
+    If it is `whole`, whatever exerts forces is taken, and "at walls" has the sizes of the forces of
+    all walls on each particle, shape (N,). Without, contacts have laws that can be measured, or a NotLinearisedError
+    says why not.
+    """
+    log = log_file(lmp, files)
+    if given is None:
+        if log is None:
+            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+        given = read_commands(text_of(log), log=True)
+    styles = styles_of(lmp)
+    unmeasured = _check_instance(lmp, styles, given)
+    if not len(owned_array(lmp, "id")):
+        raise NotTakenError("This LAMMPS has no particles.")
+    if unmeasured and not whole:
+        raise NotLinearisedError(unmeasured)
+    plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
+    dimension = lmp.extract_setting("dimension")
+    groups = {name: styles.groups[name] for name, style in plain.items() if style.startswith((*WALLS, *MOBILE))}
+    for name in [name for name, style in plain.items() if style in BODIES]:
+        groups |= {f"{name} {group}": group for group in translating_bodies(given.fixes[name], dimension)}
+    quieten(lmp, drag=True)
+    usual = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
+    rolling = " p5 p6 p7" if any(map(rolls, given.pair)) else ""
+    found = arrays_at_rest(lmp, groups, COLUMNS if whole else [usual + rolling])
+    change = _change_in_time(lmp, plain, given.fixes)
+    _walls(lmp, plain, acting_fixes(plain, given), found, together=whole)
+    forces = [
+        found["f"],
+        found["contacts"][:, 3:4],
+        *(each for name, each in found.items() if name.startswith("wall ")),
+    ]
+    if change > FOLLOWS_TIME * max(np.abs(each).max(initial=0.0) for each in forces):
+        variable = (
+            "a load, a wall or a region follows a variable of the step or the time; give it a constant before the last "
+            "run, and run on until the packing rests"
         )
+        says = TWICE if touch_twice(*found["partners"].T) else variable
+        raise NotTakenError(f"LAMMPS's forces change with the time, though nothing moves: {says}.")
+    members = {name: found[f"group {name}"] for name in groups}
+    lines = {name: line for name, line in given.fixes.items() if plain.get(name) in MOBILE}
+    return Looked(given, styles.fixes, found, mobility(lines, members, found["rmass"], dimension))
 
 
-def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
-    """Refuse styles of an instance that are not linearised here."""
+def _check_instance(lmp: Any, styles: Styles, commands: Commands) -> str:
+    """Refuse an instance that cannot be taken. Why the laws of its contacts are not measured; empty if they are."""
     if without_suffix(styles.pair) != commands.style:
         raise NotTakenError(
             f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."
@@ -161,25 +156,81 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     for name, style in styles.fixes.items():
         if style.startswith("rigid") and name in commands.fixes:
             translating_bodies(commands.fixes[name], lmp.extract_setting("dimension"))
-    check_fixes(styles.fixes, commands)
+    at_walls = check_fixes(styles.fixes, commands)
     if lmp.extract_setting("molecule_flag") and lmp.extract_global("nbonds"):
-        raise NotLinearisedError("Bonds hold particles together: take them out.")
-    check_pair(commands, lmp.available_styles("pair"))
-    walls = [name for name, style in styles.fixes.items() if without_suffix(style) == "wall/gran"]
-    silent = _silent_walls(walls, commands)
-    rolling = [name for name in walls if rolls(commands.fixes[name])]
-    if (silent or rolling) and not can_copy(lmp):
-        what = "its contacts: write contacts at its end" if silent else "its rolling friction"
-        raise NotTakenError(
-            f"fix {(silent or rolling)[0]} wall/gran does not hand out {what}; or take one rank and one thread, where "
-            "it is found without the wall."
-        )
+        return "Bonds hold particles together: take them out."
+    return at_walls or unmeasured_pair(commands)
 
 
-def _silent_walls(walls: list[str], commands: Commands) -> list[str]:
-    """IDs of walls that hand out no contacts."""
-    lines = {name: commands.fixes.get(name, "") for name in walls}
-    return [name for name, line in lines.items() if OWN not in line and "contacts" not in line.split()]
+def arrays_at_rest(lmp: Any, groups: dict[str, str], columns: list[str]) -> Arrays:
+    """Particles, forces and contacts after zero steps at rest, and who is in some groups; `v` and `omega` are the
+    velocities before."""
+    found: Arrays = dict(zip(("v", "omega"), by_id(lmp, "v", "omega"), strict=True))
+    owned_array(lmp, "v")[:] = owned_array(lmp, "omega")[:] = 0.0
+    lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
+    for each in columns:  # not every pair style hands all of these out
+        try:
+            lmp.command(f"compute faultgouge_c all pair/local {each} cutoff radius")
+            lmp.command("run 0 post no")
+            break
+        except Exception:
+            if each == columns[-1]:
+                raise
+            lmp.command("uncompute faultgouge_c")
+    names = ("id", "type", "x", "f", "torque", "radius", "rmass")
+    found |= zip(names, by_id(lmp, *names), strict=True)
+    for name, key in (("c", "contacts"), ("i", "partners")):
+        local = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
+        found[key] = np.zeros((0, 10 if name == "c" else 2)) if local is None else np.array(local)
+    for fix, group in groups.items():
+        lmp.command(f"variable faultgouge_g atom gmask({group})")
+        mask = np.array(lmp.numpy.extract_variable("faultgouge_g", "all", 1))
+        found[f"group {fix}"] = mask[: len(found["id"])][np.argsort(owned_array(lmp, "id"))] > 0
+        lmp.command("variable faultgouge_g delete")
+    for name, style in styles_of(lmp).fixes.items():
+        if style == "wall/mindlin/smooth":
+            rows = lmp.numpy.extract_fix(name, 1, 2)
+            found[f"wall {name}"] = np.array(rows)[: len(found["id"])][np.argsort(owned_array(lmp, "id"))]
+    for name in "ci":
+        lmp.command(f"uncompute faultgouge_{name}")
+    return found
+
+
+def _walls(lmp: Any, plain: dict[str, str], others: dict[str, str], found: Arrays, *, together: bool) -> None:
+    """Add what each wall exerts, or all of them: what is missing without it, and without fixes that depend on it."""
+    walls = [name for name, style in plain.items() if style.startswith("wall/gran")]
+    for name in [name for name, style in plain.items() if style in HOLDS or name in others] if walls else ():
+        lmp.command(f"unfix {name}")
+    lmp.command("run 0 post no")
+    force, torque = by_id(lmp, "f", "torque")
+    all_forces = force
+    for name in walls:
+        lmp.command(f"unfix {name}")
+        lmp.command("run 0 post no")
+        now, turns = by_id(lmp, "f", "torque")
+        found[f"wall {name}"], found[f"torque {name}"], force, torque = force - now, torque - turns, now, turns
+    if together:
+        found["at walls"] = np.linalg.norm(all_forces - force, axis=1)
+
+
+def hold_still(lmp: Any, plain: dict[str, str], lines: dict[str, str]) -> None:
+    """Have no fix move the particles of a copy; what has a velocity keeps it. Bodies stay, as dashpots feel their mass:
+    a body takes its velocity from its particles where a run begins."""
+    for name, style in plain.items():
+        if style in BODIES:
+            lmp.command(f"{lines[name]} force * off off off torque * off off off")
+        elif style.startswith(MOVES):
+            lmp.command(f"unfix {name}")
+
+
+def _change_in_time(lmp: Any, plain: dict[str, str], lines: dict[str, str]) -> float:
+    """Largest change of a force, or of a torque over the radius, though nothing moves."""
+    hold_still(lmp, plain, lines)
+    lmp.command("run 1 post no")
+    before = by_id(lmp, "f", "torque")
+    lmp.command(f"run {STILL_STEPS} post no")
+    force, torque = (np.abs(a - b).max(axis=1) for a, b in zip(before, by_id(lmp, "f", "torque"), strict=True))
+    return float(np.maximum(force, torque / by_id(lmp, "radius")[0]).max())
 
 
 def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -190,24 +241,13 @@ def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     return edges, np.array(low), np.array(periodic, dtype=np.bool_)
 
 
-def particles_of(lmp: Any, found: Arrays, free: NDArray[np.bool_], factor: Floats) -> dict[str, Any]:
-    """Fields of a Configuration that concern particles and box, without the load.
-
-    `free` says which particles move, shape (N,), and `factor` is the moment of inertia over m R^2, shape (N,).
-    """
+def particles_of(lmp: Any, found: Arrays, moved: Mobility) -> dict[str, Any]:
+    """Fields of a Configuration that concern particles, bodies and box, without the load."""
     dimension = lmp.extract_setting("dimension")
     box, origin, periodic = box_of(lmp)
     return {
-        "dimension": dimension,
-        "position": found["x"][:, :dimension],
-        "radius": found["radius"],
-        "mass": found["rmass"],
-        "inertia": factor * found["rmass"] * found["radius"] ** 2,
-        "box": box,
-        "origin": origin,
-        "periodic": periodic,
-        "load": np.zeros((len(found["id"]), 2, 3)),
-        "free": free,
-        "ids": found["id"].astype(np.int64),
-        "kind": found["type"].astype(np.int64),
-    }
+        "dimension": dimension, "position": found["x"][:, :dimension], "radius": found["radius"],
+        "mass": found["rmass"], "inertia": moved.factor * found["rmass"] * found["radius"] ** 2, "box": box,
+        "origin": origin, "periodic": periodic, "load": np.zeros((len(found["id"]), 2, 3)), "free": moved.free,
+        "constraint": moved.needed, "ids": found["id"].astype(np.int64), "kind": found["type"].astype(np.int64),
+    }  # fmt: skip

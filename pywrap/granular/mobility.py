@@ -8,7 +8,6 @@ the sum of theirs. A component that `fix setforce` sets to zero, and whatever no
 empty.
 """
 
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -16,30 +15,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from ...analysis.arrays import Floats
-from ...analysis.counted import counted
-from .granular_commands import BODIES, NotTakenError, without_suffix
+from .granular_commands import BODIES, TURNS, NotTakenError, without_suffix
 
-TURNS = ("nve/sphere", "nve/disc", "overdamped/disc")
-"""Fixes that move particles and turn them."""
-
-INTEGRATES = ("nve", "nve/limit", *TURNS, *BODIES)
-"""Fixes that move particles."""
+YES = ("on", "yes", "true")
 
 
-HELD = "force * off off off torque * off off off"
-"""Words by which a body keeps its velocity, whatever its particles feel. The fix stays where forces are measured, as
-dashpots feel the mass of the body, which takes its velocity from its particles where a run begins."""
-
-
-class Body(NamedTuple):
-    """A group of particles that translate as one, along some of the axes."""
-
-    group: str
-    axes: tuple[bool, bool, bool]
-
-
-def translating_bodies(line: str, dimension: int) -> list[Body]:
-    """The bodies of a command fix rigid.
+def translating_bodies(line: str, dimension: int) -> dict[str, NDArray[np.bool_]]:
+    """The groups of the bodies of a command fix rigid, and along which axes each translates, shape (3,).
 
     Raises
     ------
@@ -49,11 +31,9 @@ def translating_bodies(line: str, dimension: int) -> list[Body]:
     words = line.split()
     name, style, kind = words[1], words[3], words[4]
     groups = [words[2]] if kind == "single" else words[6 : 6 + int(words[5])] if kind == "group" else []
-    if without_suffix(style) not in BODIES or not groups:
-        raise NotTakenError(f"fix {name} {style} {kind} {WAY_OUT}.")
-    axes, turns = ([[True] * 3 for _ in groups] for _ in range(2))
+    axes, turns = np.ones((2, len(groups), 3), np.bool_)
     at = 5 if kind == "single" else 6 + len(groups)
-    while at < len(words):
+    while groups and at < len(words):
         if words[at] == "reinit" and words[at + 1] in YES:
             at += 2
             continue
@@ -62,40 +42,27 @@ def translating_bodies(line: str, dimension: int) -> list[Body]:
                 f"fix {name} {style} has {' '.join(words[at : at + 2])}, which is not known here: leave it out."
             )
         low, star, high = words[at + 1].partition("*")
-        which = range(int(low or 1) - 1, int(high or len(groups)) if star else int(low))
-        for k in which:
-            (axes if words[at] == "force" else turns)[k] = [word in YES for word in words[at + 2 : at + 5]]
+        which = slice(int(low or 1) - 1, int(high or len(groups)) if star else int(low))
+        (axes if words[at] == "force" else turns)[which] = [word in YES for word in words[at + 2 : at + 5]]
         at += 5
-    if any(any(each if dimension == 3 else each[2:]) for each in turns):
-        raise NotTakenError(f"fix {name} {style} {kind} {WAY_OUT}.")
-    return [Body(group, (x, y, z)) for group, (x, y, z) in zip(groups, axes, strict=True)]
-
-
-WAY_OUT = (
-    "holds particles together in bodies that may rotate, and rotations of bodies are not linearised here: for lids "
-    "that do not rotate use fix rigid single, or group, with `torque * off off off` at the end of its line"
-)
-
-YES = ("on", "yes", "true")
+    if without_suffix(style) not in BODIES or not groups or (turns if dimension == 3 else turns[:, 2:]).any():
+        raise NotTakenError(
+            f"fix {name} {style} {kind} holds particles together in bodies that may rotate, and rotations of bodies "
+            "are not linearised here: for lids that do not rotate use fix rigid single, or group, with `torque * off "
+            "off off` at the end of its line."
+        )
+    return dict(zip(groups, axes, strict=True))
 
 
 class Mobility(NamedTuple):
-    """P of q = P Q, square; I/(m R^2) of each particle; and the mass that dashpots feel, of a body all of its own."""
+    """P of q = P Q, square, and `needed` where it says more than which particles are free, shape (N,); I/(m R^2) of
+    each particle; and the mass that dashpots feel, of a body all of its own, infinite where frozen."""
 
     constraint: csr_array
+    needed: csr_array | None
+    free: NDArray[np.bool_]
     factor: Floats
     felt_mass: Floats
-
-    @property
-    def free(self) -> NDArray[np.bool_]:
-        """Which particles move, shape (N,)."""
-        return np.asarray(np.diff(self.constraint.indptr).reshape(-1, len(self.factor)).any(axis=0))
-
-    @property
-    def needed(self) -> csr_array | None:
-        """P where it says more than which particles move; otherwise None."""
-        free = np.tile(self.free, self.constraint.shape[0] // len(self.factor)).astype(np.float64)
-        return self.constraint if abs(self.constraint - diags_array(free)).nnz else None
 
 
 def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass: Floats, dimension: int) -> Mobility:
@@ -115,23 +82,19 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     Raises
     ------
     NotTakenError
-        If a fix moves or holds particles otherwise, or two fixes move the same ones.
+        If a fix moves or holds particles otherwise.
     """
     styles = {name: without_suffix(line.split()[3]) for name, line in lines.items()}
     bodies = {name: translating_bodies(lines[name], dimension) for name, style in styles.items() if style in BODIES}
-    inside = dict(members)  # of a fix rigid, which moves no other particle of its own group, those of its bodies
-    inside |= {name: np.any([members[f"{name} {b.group}"] for b in each], axis=0) for name, each in bodies.items()}
-    for one, other in combinations([name for name, style in styles.items() if style in INTEGRATES], 2):
-        if both := int(np.count_nonzero(inside[one] & inside[other])):
-            raise NotTakenError(
-                f"fix {one} and fix {other} both move {counted(both, 'particle')}, which LAMMPS then moves twice in "
-                "each step: unfix one of them, or have it move other particles."
-            )
+    # fix rigid moves the particles of its bodies alone, whatever its own group is
+    inside = members | {
+        name: np.any([members[f"{name} {group}"] for group in each], axis=0) for name, each in bodies.items()
+    }
     # of each component of (translation, rotation): whether it moves, who leads it, and by how much
     moves, leader = np.zeros((6, len(mass)), np.bool_), np.tile(np.arange(len(mass)), (6, 1))
     weight, factor, felt = np.ones((6, len(mass))), np.full(len(mass), 0.4), np.array(mass)
     # forces are set after all integrators are known, whatever the order of the deck, and freeze comes last
-    order = ("setforce", "lineforce", "planeforce", "aveforce", "freeze")
+    order = ("setforce", "aveforce", "freeze")
     for name in sorted(lines, key=lambda each: 1 + order.index(styles[each]) if styles[each] in order else 0):
         style, words, here = styles[name], lines[name].split()[4:], inside[name]
         if style in TURNS:
@@ -141,35 +104,22 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
         elif style in ("nve", "nve/limit"):  # a limit of steps does not act on small motion
             moves[:3, here] = True
         elif style == "freeze":
-            moves[:, here] = False
-        elif style in ("lineforce", "planeforce"):
-            along = np.array([float(word) for word in words[:3]]) != 0.0
-            if along.sum() != 1:
-                raise NotTakenError(
-                    f"fix {name} {style} has a direction along no axis, which is not known here: unfix it."
-                )
-            moves[:3] &= ~(here & (along if style == "planeforce" else ~along)[:, None])
-        for body in bodies.get(name, ()):
-            body_members = members[f"{name} {body.group}"]
-            felt[body_members] = mass[body_members].sum()
-            moves[:3, body_members] = np.array(body.axes)[:, None]
-            leader[:3, body_members] = np.flatnonzero(body_members)[:1]
+            moves[:, here], felt[here] = False, np.inf
+        for group, along in bodies.get(name, {}).items():
+            body = members[f"{name} {group}"]
+            felt[body], moves[:3, body], leader[:3, body] = mass[body].sum(), along[:, None], np.flatnonzero(body)[:1]
         for k, word in enumerate(words[:3] if style in ("setforce", "aveforce") else ()):
             if word == "NULL":
                 continue
+            if "v_" in word or (style == "setforce" and float(word) != 0.0):
+                raise NotTakenError(
+                    f"fix {name} {style} drives particles by the force {word}: use 0.0 or NULL, and fix addforce."
+                )
             if style == "setforce":
-                if "v_" in word or float(word) != 0.0:
-                    raise NotTakenError(f"fix {name} setforce drives particles: only 0.0 and NULL hold them.")
                 moves[k, here] = False
                 continue
-            if "v_" in word:  # K by differences takes this fix away, and its force with it
-                raise NotTakenError(
-                    f"fix {name} aveforce adds the force {word}, which may change with the place: give this force to "
-                    "fix addforce, and 0.0 to fix aveforce."
-                )
             joined = np.flatnonzero(here & moves[k])
-            leader[k, joined] = joined[:1]
-            weight[k, joined] = mass[joined[:1]] / mass[joined]
+            leader[k, joined], weight[k, joined] = joined[:1], mass[joined[:1]] / mass[joined]
     axes = np.arange(6) if dimension == 3 else np.array([0, 1, 5])
     if not moves[axes].any():
         raise NotTakenError(
@@ -179,5 +129,9 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     row = np.flatnonzero(moves[axes])
     column = (leader[axes] + len(mass) * np.arange(len(axes))[:, None]).ravel()
     size = len(axes) * len(mass)
-    constraint = csr_array((weight[axes].ravel()[row], (row, column[row])), shape=(size, size))
-    return Mobility(constraint, factor, felt)
+    constraint, free = (
+        csr_array((weight[axes].ravel()[row], (row, column[row])), shape=(size, size)),
+        moves[axes].any(0),
+    )
+    plain = abs(constraint - diags_array(np.tile(free, len(axes)).astype(np.float64))).nnz == 0
+    return Mobility(constraint, None if plain else constraint, free, factor, felt)

@@ -16,13 +16,13 @@ import numpy as np
 from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from .balance import check_balance, creeping_law, force_scale, held_remarks, restless_fix
+from .balance import check_balance, force_scale, keeps_moving, motion_remarks
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import Commands, NotTakenError, read_commands
 from .lammps_arrays import owned_array, rows_of, set_up_run, set_velocity
-from .look_in_a_copy import can_copy, explain_error, require_instance
-from .motion_proof import acting_fixes
+from .look_in_a_copy import explain_error, require_instance
+from .looks import acting_fixes, may_act
 
 REST_SHARE = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
@@ -99,25 +99,18 @@ def relax(
     if steps < 1:
         raise BadInputError(f"steps = {steps} is refused: nothing would come to rest; give a number from 1 on.")
     require_instance(lmp, "relax")
-    if not can_copy(lmp):
-        raise NotTakenError("relax looks at copies of the process: use one rank and one thread.")
     lines = None if commands is None else read_commands(commands)
 
-    still = still_particles(lmp, lines)
-    look = partial(take_configuration, lmp, lines, {}, slides=False, balance=np.inf, prove=False)
+    start, looked = still_particles(lmp, lines)
+    look = partial(take_configuration, lmp, lines, {})
     try:
-        found, _ = bring_to_rest(
-            lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT, watch=watch
-        )
+        found, _ = bring_to_rest(lmp, look, start, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT, watch=watch)
     except NoEquilibriumError as error:
-        held = held_remarks(still.configuration, still.velocity, still.rotation, float(lmp.extract_global("dt")))
+        dt, was = float(lmp.extract_global("dt")), looked.found
         says = (
-            restless_fix(still.commands)
-            or " and ".join(held)
-            or creeping_law(still.commands)
-            or " and ".join(
-                f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
-            )
+            keeps_moving(looked.commands)
+            or " and ".join(motion_remarks(start, was["v"], was["omega"], dt))
+            or may_act(acting_fixes(looked.fixes, looked.commands))
         )
         if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
@@ -167,22 +160,28 @@ def bring_to_rest(
     """
     dt, diameter, mass = float(lmp.extract_global("dt")), 2 * float(start.radius.mean()), start.mass[start.free]
     fastest = FASTEST * float(mass.min() / mass.mean())
-    slowest, drags = min(SLOWEST, fastest), [("faultgouge_drag", "viscous")]
+    slowest, drags = min(SLOWEST, fastest), {"faultgouge_drag": "viscous"}
     if lmp.has_style("fix", "viscous/sphere"):  # else dashpots alone stop rotations
-        drags.append(("faultgouge_spin", "viscous/sphere"))
-    rate, changes = float(np.clip(rate, slowest, fastest)), True
+        drags["faultgouge_spin"] = "viscous/sphere"
+    rate, before = float(np.clip(rate, slowest, fastest)), 0.0
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == STEPS_WITHOUT_GAIN:
                 found = look()
-                _refuse_long_steps(found, dt, where)
-                rounding = _rounding(found)
+                if dt > (limit := float(stable_timestep(found))):
+                    raise NoEquilibriumError(
+                        f"The packing vibrates{where} and cannot come to rest: its time step {dt:.4g} is longer than "
+                        f"the largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
+                    )
+                # nothing comes closer than the rounding of a coordinate, times the stiffest contact
+                stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
+                rounding = FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
             viscous = rate * float(mass.mean()) / dt
             strengths = viscous, viscous * float(np.min(start.radius**2)) * (len(drags) > 1)
-            for (name, style), strength in zip(drags if changes else (), strengths, strict=False):
+            for (name, style), strength in zip(drags.items() if rate != before else (), strengths, strict=False):
                 lmp.command(f"fix {name} all {style} {strength:.17g}")
-            _run(lmp, len(start), where, set_up=changes)
+            _run(lmp, len(start), where, set_up=rate != before)
             forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), strengths)
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
@@ -205,32 +204,14 @@ def bring_to_rest(
                 raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
             ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
             rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
-            changes = rate != before
     finally:
-        for name, _ in drags:
-            if name in lmp.available_ids("fix"):
-                lmp.command(f"unfix {name}")
+        for name in drags.keys() & set(lmp.available_ids("fix")):
+            lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
         f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
         f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
         "steps, or the packing creeps or flows."
     )
-
-
-def _rounding(found: Configuration) -> float:
-    """Change of the force of the stiffest contact by the rounding of a coordinate."""
-    stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
-    return FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
-
-
-def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:
-    """Refuse to wait for a packing that vibrates because its time step is not stable."""
-    limit = float(stable_timestep(found))
-    if timestep > limit:
-        raise NoEquilibriumError(
-            f"The packing vibrates{where} and cannot come to rest: its time step {timestep:.4g} is longer than the "
-            f"largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
-        )
 
 
 def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:

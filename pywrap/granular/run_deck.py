@@ -14,8 +14,7 @@ on from there with the commands that hold.
 import ctypes
 import os
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,50 +24,55 @@ from ...analysis import BadInputError, Configuration, NoEquilibriumError
 from ...plugin import directory
 from ..lammps.instance import lammps_instance
 from ..lammps.plain_file_names import shared_folder
-from .balance import BALANCE, check_balance, moving_region
+from .balance import BALANCE, check_balance
 from .from_lammps import from_lammps
-from .granular_commands import GIVE_LINE, GIVE_LINES, NotLinearisedError, NotTakenError, commands_of
-from .look_in_a_copy import INSERTS, can_copy, communicator, explain_error, in_a_copy, name_of, of_lammps, styles_of
-from .looks import check_instance
+from .granular_commands import GIVE_LINES, NotTakenError, commands_of
+from .look_in_a_copy import INSERTS, explain_error, name_of, of_lammps, styles_of
 from .relax import relax
 
-AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log")
-"""Words of the command line for what the program lmp does without any."""
+WORLD = MPI.COMM_WORLD
+
+AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log", "-echo", "both")
+"""Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands."""
+
+BEFORE_RUNS = ctypes.CFUNCTYPE(None)(lambda: None)
+"""What the plugin calls before the first run."""
 
 QUIT = "faultgouge: the deck ends by quit"
 """What LAMMPS stops with where a deck quits (`deck_watch.cpp`)."""
 
 LIGGGHTS = (
-    "hard_particles", "atom_style granular", "gran model", "property/global", "particletemplate",
-    "particledistribution", "mesh/surface", "insert/", "nve/sphere/", "modify_timing", "coarsegraining",
+    "hard_particles", "atom_style granular", "gran model", "property/global", "particletemplate", "mesh/surface",
+    "insert/",
 )  # fmt: skip
 """Words of LIGGGHTS's commands that LAMMPS does not have."""
 
 WRITERS = ("print", "ave/", "record")
 """Fixes that write files, by the beginnings of their styles."""
 
-Notice = Callable[[str], None]
+ENDS = (*INSERTS, "halt")
+"""Fixes that make particles, or end a run."""
 
+BEFORE_THE_BOX = ("package", "suffix", "newton", "processors", "atom_modify", "comm_style")
+BEHIND = (
+    "lattice", "comm_modify", "neighbor", "neigh_modify", "special_bonds", "timestep", "run_style", "thermo_modify",
+    "pair_style", "pair_modify", "pair_coeff", "region", "variable", "fix", "fix_modify",
+)  # fmt: skip
+"""Commands of which a deck that goes on has those that hold, before and behind read_restart."""
 
-@dataclass(frozen=True)
-class EndedDeck:
-    """A LAMMPS after its deck: the instance, the commands that it has carried out, in words, and why it stopped, if an
-    error has ended the deck."""
+NAMED, ADDED = ("region", "variable", "fix"), ("pair_coeff", "fix_modify", "comm_modify", "neigh_modify")
+"""Commands of which the last one of each name holds, and of which all hold."""
 
-    lmp: Any
-    carried_out: list[list[str]]
-    stopped: str
+RESTART = "RESTART.FILE"
 
 
 def run_deck(
     path: Path,
     *,
-    slides: bool = False,
     balance: float = BALANCE,
     relaxes: bool = False,
     keep: Path | None = None,
-    notice: Notice | None = None,
-    show: Notice | None = None,
+    show: Callable[[str], None] | None = None,
     use: Callable[[Any, Configuration], None] | None = None,
 ) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
@@ -77,14 +81,12 @@ def run_deck(
     ----------
     path : Path
         The deck.
-    slides, balance
+    balance : float
         As of :func:`~faultgouge.pywrap.from_lammps`.
     relaxes : bool
         Whether the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`.
     keep : Path, optional
         A state that cannot be taken, or at which LAMMPS stops, is kept in a new restart file beside this one.
-    notice : callable, optional
-        Gets a sentence before the first run if what is set up cannot be taken as it stands; the deck may change that.
     show : callable, optional
         Gets how far `relaxes` has come.
     use : callable, optional
@@ -100,50 +102,46 @@ def run_deck(
     check_balance(balance)
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    deck = carry_out_deck(path, notice)
+    lmp, carried_out, stopped = _carry_out(path)
     try:
-        found = _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        if stopped:
+            raise NotTakenError(f"{path}: {stopped}")
+        commands = commands_of(carried_out, "The deck has")
+        if relaxes:
+            for name, style in styles_of(lmp).fixes.items():
+                if style.startswith(ENDS):  # only the particles that there are come to rest
+                    lmp.command(f"unfix {name}")
+            relax(lmp, commands, watch=show)
+        found = from_lammps(lmp, commands, balance=balance)
         if use is not None:
-            use(deck.lmp, found)
+            use(lmp, found)
         return found
     except (NotTakenError, NoEquilibriumError) as error:
-        kept = keep_state(deck.lmp, deck.carried_out, keep, path) if keep else ""
-        raise NotTakenError(f"{_of_deck(str(error)).rstrip('.')}. {kept}".rstrip()) from error
+        hidden = "leave `echo none` and `echo log` out of the deck, which keep commands from this program"
+        says = str(error).replace(GIVE_LINES, hidden).rstrip(".")
+        kept = _keep_state(lmp, carried_out, keep, path) if keep else ""
+        raise NotTakenError(f"{says}. {kept}".rstrip()) from error
     finally:
-        deck.lmp.close()
+        lmp.close()
 
 
-def _of_deck(says: str) -> str:
-    """A sentence about commands that are missing, for a deck in place of a script in Python."""
-    hidden = "leave `echo none` and `echo log` out of the deck, which keep commands from this program"
-    return says.replace(GIVE_LINES, hidden).replace(GIVE_LINE, hidden)
-
-
-def carry_out_deck(path: Path, notice: Notice | None = None) -> EndedDeck:
-    """Have LAMMPS carry out a deck in its folder; the caller closes the instance, whose files are closed."""
-    here, carried_out = os.getcwd(), list[list[str]]()
+def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
+    """Have LAMMPS carry out a deck in its folder: the instance, whose files are closed; the commands that it has
+    carried out, in words; and why it stopped, if an error has ended the deck."""
+    here, carried_out, stopped, complete = os.getcwd(), list[list[str]](), "", False
+    told = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))(
+        lambda number, words: carried_out.append([os.fsdecode(word) for word in words[:number]])
+    )
     os.chdir(path.parent)
     try:
         try:
-            lmp = lammps_instance(MPI.COMM_WORLD, None, *AS_THE_PROGRAM, "-echo", "both")
+            lmp = lammps_instance(WORLD, None, *AS_THE_PROGRAM)
         except Exception as error:
             if not of_lammps(error):
                 raise
             raise NotTakenError(f"{path}: {explain_error(error)}") from error
         plugin = ctypes.CDLL(str(Path(directory()) / "mindlinsmoothplugin.so"))
-
-        @ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
-        def told(count: int, words: Any) -> None:
-            carried_out.append([os.fsdecode(word) for word in words[:count]])
-
-        @ctypes.CFUNCTYPE(None)
-        def runs() -> None:
-            says = _not_taken_yet(lmp, carried_out) if notice and can_copy(lmp) else ""
-            if notice and says:
-                notice(f"{path}: as it stands before the first run, the packing cannot be taken: {says}")
-
-        stopped, complete = "", False
-        plugin.faultgouge_watch(lmp.lmp, told, runs)
+        plugin.faultgouge_watch(lmp.lmp, told, BEFORE_RUNS)
         try:
             with open(path.name, "rb") as stream:  # LAMMPS's bindings do not take any name
                 lmp.file(name_of(stream))
@@ -154,144 +152,80 @@ def carry_out_deck(path: Path, notice: Notice | None = None) -> EndedDeck:
             plugin.faultgouge_end_watch(lmp.lmp, int(complete))
     finally:
         os.chdir(here)
-    carried_out = communicator(lmp).bcast(carried_out, root=0)
-    if lmp.extract_setting("box_exist"):
-        _close_files(lmp, carried_out)
-    return EndedDeck(lmp, carried_out, stopped)
-
-
-def _close_files(lmp: Any, carried_out: list[list[str]]) -> None:
-    """Close the files that a deck has open; and have no run of this program end early, or need what is taken away."""
-    lost = [words[words.index("lost") + 1] for words in carried_out if "lost" in words and words[0] == "thermo_modify"]
-    lmp.command("thermo_style custom step")
-    lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
-    for name in lmp.available_ids("dump"):
-        lmp.command(f"undump {name}")
-    for name, style in styles_of(lmp).fixes.items():
-        if style.startswith(WRITERS):
-            lmp.command(f"unfix {name}")
-    lmp.command("restart 0")
-    lmp.command("timer timeout unlimited")
-
-
-def _not_taken_yet(lmp: Any, carried_out: list[list[str]]) -> str:
-    """Why a packing cannot be taken as it stands before a run; empty if no reason is known yet."""
-
-    def look() -> None:
-        commands = commands_of(carried_out, "The deck has")
-        try:
-            check_instance(lmp, styles_of(lmp), commands)
-        except NotLinearisedError:  # K by differences of forces may serve
-            if says := moving_region(lmp, commands):
-                raise NotTakenError(says) from None
-
-    try:
-        in_a_copy(look)
-    except NotTakenError as error:
-        return _of_deck(str(error)) if "LAMMPS stopped" not in str(error) else ""
-    return ""
-
-
-def _take(
-    deck: EndedDeck, path: Path, *, slides: bool, balance: float, relaxes: bool, show: Notice | None
-) -> Configuration:
-    """What `from_lammps` takes of an ended deck, after `relax` if that is asked for."""
-    if deck.stopped:
-        raise NotTakenError(f"{path}: {_explain_stop(deck)}")
-    commands = commands_of(deck.carried_out, "The deck has")
-    if relaxes:
-        for name, style in styles_of(deck.lmp).fixes.items():
-            if style.startswith((*INSERTS, "halt")):  # only the particles that there are come to rest
-                deck.lmp.command(f"unfix {name}")
-        relax(deck.lmp, commands, watch=show)
-    return from_lammps(deck.lmp, commands, slides=slides, balance=balance)
-
-
-def _explain_stop(deck: EndedDeck) -> str:
-    """What LAMMPS says, and whether the deck is one of LIGGGHTS."""
-    lines = [" ".join(words) for words in deck.carried_out[-1:]]
-    if any(word in line for line in (deck.stopped, *lines) for word in LIGGGHTS):
-        return (
-            f"{deck.stopped.rstrip('.')}: this is a deck of LIGGGHTS, whose commands LAMMPS does not have; write "
+    carried_out = WORLD.bcast(carried_out, root=0)
+    if stopped and any(word in f"{stopped} {' '.join(carried_out[-1] if carried_out else ())}" for word in LIGGGHTS):
+        stopped = (
+            f"{stopped.rstrip('.')}: this is a deck of LIGGGHTS, whose commands LAMMPS does not have; write "
             "pair_style, fix wall/gran and what makes particles as LAMMPS's manual has them (docs/decks.md)."
         )
-    return deck.stopped
+    if lmp.extract_setting("box_exist"):  # no file of the deck is written any more, and no run ends early
+        lost = [
+            words[words.index("lost") + 1] for words in carried_out if words[0] == "thermo_modify" and "lost" in words
+        ]
+        lmp.command("thermo_style custom step")
+        lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
+        for name in lmp.available_ids("dump"):
+            lmp.command(f"undump {name}")
+        for name, style in styles_of(lmp).fixes.items():
+            if style.startswith(WRITERS):
+                lmp.command(f"unfix {name}")
+        lmp.command("restart 0")
+        lmp.command("timer timeout unlimited")
+    return lmp, carried_out, stopped
 
 
-MDR_HISTORY = "MDR_PARTICLE_HISTORY_VARIABLES"
-"""ID of the fix by which LAMMPS keeps what particles of the model mdr remember."""
-
-MDR_WALLS = "LAMMPS of 22 Jul 2025 crashes where a wall of the model mdr stands behind read_restart"
-
-BEFORE_THE_BOX = ("package", "suffix", "newton", "processors", "atom_modify", "comm_style")
-SETTINGS = (
-    "comm_modify", "neighbor", "neigh_modify", "special_bonds", "timestep", "run_style", "thermo_modify", "pair_modify",
-)  # fmt: skip
-"""Commands of which a deck that goes on has the last ones, before and behind read_restart."""
-
-RESTART = "RESTART.FILE"
-
-NAMED = ("region", "variable", "compute", "fix")
-"""Commands that define something of a name."""
-
-NOT_AGAIN = (*INSERTS, "halt", "print", "ave/", "record")
-"""Fixes that would make particles, end a run or write to files of the deck, by the beginnings of their styles."""
-
-
-def keep_state(lmp: Any, carried_out: Iterable[list[str]], keep: Path, deck: Path) -> str:
+def _keep_state(lmp: Any, carried_out: list[list[str]], keep: Path, deck: Path) -> str:
     """Write the state to a new restart file beside `keep`, and a deck beside it; the sentence that says where they are,
     or why there are none."""
     if lmp.get_natoms() == 0:
         return "No state is kept, as there are no particles."
-    world = communicator(lmp)
-    with shared_folder(world) as folder:
+    with shared_folder(WORLD) as folder:
         try:
-            lmp.command("restart 0")
-            lmp.command(f"restart 1 {folder}/state.*")
-            lmp.command("run 1 post no")
-            lmp.command("restart 0")
+            for line in ("restart 0", f"restart 1 {folder}/state.*", "run 1 post no", "restart 0"):
+                lmp.command(line)
         except Exception as error:  # LAMMPS's bindings raise any error
             return f"The state is not kept: {explain_error(error)}"
-        lines = deck_lines(list(carried_out), styles_of(lmp).fixes)
-        kept, says = None, ""
-        if world.rank == 0:
-            written = max(Path(folder).iterdir())
-            kept, says = _store(written, keep, [f"# goes on where {deck.name} has ended", *lines])
-    kept, says = world.bcast((kept, says), root=0)
-    if kept is None:
-        return f"The state is not kept: {says}."
-    if MDR_HISTORY in lmp.available_ids("fix") and any("wall/gran" in each for each in styles_of(lmp).fixes.values()):
-        return f"The state, one step on, is kept in {kept}, but {MDR_WALLS}."
-    return (
+        lines = _deck_lines(carried_out, styles_of(lmp).fixes)
+        kept, says = Path(), ""
+        if WORLD.rank == 0:
+            try:
+                kept = _store(max(folder.iterdir()), keep, [f"# goes on where {deck.name} has ended", *lines])
+            except OSError as error:
+                says = f"The state is not kept: {error.filename}: {error.strerror}."
+        kept, says = WORLD.bcast((kept, says), root=0)
+    return says or (
         f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it goes on from there: "
         f"faultgouge import {kept} --relax, or with a line run in that deck."
     )
 
 
-def _store(state: Path, keep: Path, lines: list[str]) -> tuple[Path | None, str]:
-    """Copy a restart file, and write its deck, to names that are not there yet; or the reason why not."""
-    stem, number = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII), 0  # LAMMPS reads the name in a line
+def _store(state: Path, keep: Path, lines: list[str]) -> Path:
+    """Copy a restart file, and write its deck, to names that are not there yet."""
+    stem = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII)  # LAMMPS reads the name in a line
+    number = 0
     while True:
         file = keep.with_name(f"{stem}.{number}.restart" if number else f"{stem}.restart")
-        deck = os.fsencode("\n".join(lines).replace(RESTART, file.name) + "\n")
-        number += 1
         made: list[Path] = []
         try:
-            for path, fill in ((file, state.read_bytes()), (Path(f"{file}.in"), deck)):
+            for path, fill in (
+                (file, state.read_bytes()),
+                (Path(f"{file}.in"), os.fsencode("\n".join(lines).replace(RESTART, file.name) + "\n")),
+            ):
                 with path.open("xb") as stream:
                     made.append(path)
                     stream.write(fill)
                     stream.flush()
                     os.fsync(stream.fileno())
-            return file, ""
+            return file
         except OSError as error:
             for path in made:
                 path.unlink(missing_ok=True)
             if not isinstance(error, FileExistsError):
-                return None, f"{error.filename or file}: {error.strerror}"
+                raise
+            number += 1
 
 
-def deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]:
+def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]:
     """The lines of a deck that goes on from a restart file: of all commands, in words, that LAMMPS has carried out,
     those that hold; `fixes` are the styles of those that there are, by ID."""
     since = 1 + max((k for k, words in enumerate(carried_out) if words[0] == "clear"), default=-1)
@@ -300,32 +234,18 @@ def deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]
         name = words[0]
         if name == "pair_style" and last.get((name,), words)[1] != words[1]:
             last = {key: each for key, each in last.items() if key[0] != "pair_coeff"}
-        keeps_all = name in ("pair_coeff", "fix_modify", "compute_modify", "comm_modify", "neigh_modify")
-        if keeps_all or name in (*BEFORE_THE_BOX, *SETTINGS, "pair_style", "region", "variable", "compute", "fix"):
-            key = (name, *words[1:]) if keeps_all else (name, *words[1:2]) if name in NAMED else (name,)
+        if name in (*BEFORE_THE_BOX, *BEHIND):
+            key = tuple(words if name in ADDED else words[: 1 + (name in NAMED)])
             last.pop(key, None)
             last[key] = words
-    stay = {name for name, style in fixes.items() if not style.startswith(NOT_AGAIN)}
-    used = [words for (name, *more), words in last.items() if name == "fix" and more[0] in stay]
-    needed = {id(words) for words in used}
-    while used:  # regions, variables and computes that these name
-        words = used.pop()
-        for (name, *more), other in last.items():
-            known = {"region": "", "variable": "v_", "compute": "c_"}.get(name)
-            if known is None or id(other) in needed:
-                continue
-            if re.search(rf"\b{known}{re.escape(more[0])}\b", " ".join(words[2:])):
-                needed.add(id(other))
-                used.append(other)
-    chosen = [
+    stay = {name for name, style in fixes.items() if not style.startswith((*ENDS, *WRITERS))}
+    before = [words for words in last.values() if words[0] in BEFORE_THE_BOX]
+    behind = [
         words
-        for (name, *more), words in last.items()
-        if name not in (*BEFORE_THE_BOX, *NAMED, "fix_modify", "compute_modify")
-        or id(words) in needed
-        or (name == "fix_modify" and more[0] in stay)
+        for words in last.values()
+        if words[0] in BEHIND and words[2:3] != ["delete"] and (not words[0].startswith("fix") or words[1] in stay)
     ]
-    before = [words for (name, *_), words in last.items() if name in BEFORE_THE_BOX]
-    return [*map(_line, before), f"read_restart {RESTART}", *map(_line, chosen)]
+    return [*map(_line, before), f"read_restart {RESTART}", *map(_line, behind)]
 
 
 def _line(words: list[str]) -> str:

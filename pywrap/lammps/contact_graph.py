@@ -4,13 +4,13 @@ Contacts seldom change from one Newton iteration to the next. The index arrays f
 and for the places of their stiffnesses in a matrix, are therefore kept.
 """
 
-from functools import cached_property
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts
-from ...analysis.arrays import Floats, Indices
+from ...analysis.arrays import Floats
 from ...analysis.factors.linear_solver import Band, Booleans, band
 
 
@@ -30,63 +30,43 @@ class ContactGraph:
         Partners; j = -1 is the floor.
     pairs : int
         Contacts of two disks; those with the floor follow.
+    reach : ndarray, shape (C,)
+        R_i + R_j of each contact, R_i for the floor; length.
+    has_contact : ndarray of bool, shape (N,)
+        Disks that have a contact.
     """
 
     def __init__(self, contacts: Contacts, radius: Floats) -> None:
-        self.contacts, self.radius = contacts, radius
+        self.contacts, self.disks = contacts, len(radius)
         self.i, self.j = contacts.i, contacts.j
-        self.pairs = int(np.count_nonzero(self.j != FLOOR))
-        self._band: Band | None = None
-
-    @cached_property
-    def reach(self) -> Floats:
-        """R_i + R_j of each contact, R_i for the floor; length, shape (C,)."""
-        reach = self.radius[self.i]
-        reach[: self.pairs] += self.radius[self.j[: self.pairs]]
-        return reach
-
-    @cached_property
-    def _ends(self) -> tuple[Indices, Indices]:
-        """The disks at the ends of all contacts, and which contacts these are."""
+        self.pairs = pairs = int(np.count_nonzero(self.j != FLOOR))
+        self.reach = radius[self.i]
+        self.reach[:pairs] += radius[self.j[:pairs]]
         contact = np.arange(len(self.i))
-        return np.concatenate([self.i, self.j[: self.pairs]]), np.concatenate([contact, contact[: self.pairs]])
-
-    @cached_property
-    def _coordinate_ends(self) -> tuple[Indices, Indices]:
-        disk, contact = self._ends
-        return (disk + len(self.radius) * np.arange(3)[:, None]).ravel(), contact
-
-    @cached_property
-    def degree(self) -> Indices:
-        """Contacts of each disk, shape (N,)."""
-        return np.bincount(self._ends[0], minlength=len(self.radius))
-
-    @cached_property
-    def has_contact(self) -> Booleans:
-        """Disks that have a contact, shape (N,)."""
-        return self.degree > 0
+        self._end = np.concatenate([self.i, self.j[:pairs]])
+        self._contact = np.concatenate([contact, contact[:pairs]])
+        self._coordinate = (self._end + self.disks * np.arange(3)[:, None]).ravel()
+        self.has_contact = np.bincount(self._end, minlength=self.disks) > 0
+        self._band: Band | None = None
 
     def old(self, earlier: "ContactGraph") -> Booleans | None:
         """Which contacts there were earlier, too, shape (C,); None if all were."""
-        if earlier is self:
-            return None
-        number = len(self.radius) + 1  # the floor, -1, is none of the disks before
+        number = self.disks + 1  # the floor, -1, is none of the disks before
         old = np.isin(number * self.i + self.j, number * earlier.i + earlier.j, assume_unique=True)
         return None if old.all() else old
 
     def per_disk(self, values: Floats | Booleans) -> NDArray:
         """Sums of numbers over the contacts of each disk, shape (N,)."""
-        disk, contact = self._ends
-        return np.bincount(disk, values.take(contact), len(self.radius))
-
-    def count(self, chosen: Booleans) -> NDArray:
-        """How many of the chosen contacts each disk has, shape (N,)."""
-        return self.degree if chosen.all() else self.per_disk(chosen)
+        return np.bincount(self._end, values.take(self._contact), self.disks)
 
     def per_coordinate(self, values: Floats) -> NDArray:
         """Three such sums, one after the other, shape (3N,), of numbers of shape (3, C)."""
-        coordinate, contact = self._coordinate_ends
-        return np.bincount(coordinate, values.take(contact, axis=1).ravel(), 3 * len(self.radius))
+        return np.bincount(self._coordinate, values.take(self._contact, axis=1).ravel(), 3 * self.disks)
+
+    def rounding(self, stiffness: Floats, unit: float) -> float:
+        """Largest error of the force on a disk if every overlap has an independent error of one unit, a length, with
+        the normal stiffness of each contact, shape (C,)."""
+        return unit * math.sqrt(self.per_disk(stiffness**2).max(initial=0.0))
 
     def band(self, active: Booleans) -> Band:
         """Where the stiffnesses of the contacts are in the matrix of some coordinates; remembered for the last ones."""

@@ -1,8 +1,6 @@
 """Deck parts, run in a LAMMPS instance: the same files that ``lmp -in`` runs."""
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -21,12 +19,12 @@ class Decks:
     """A LAMMPS instance that is driven by deck parts."""
 
     def __init__(self, lammps: Any) -> None:
-        self.lammps = lammps
+        self._lammps = lammps
 
     def command(self, command: str) -> None:
         """Run one line of an input script; an error of LAMMPS is raised as an `EngineError`."""
         try:
-            self.lammps.command(command)
+            self._lammps.command(command)
         except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone
             from lammps.core import MPIAbortException
 
@@ -50,27 +48,15 @@ class Decks:
 
     def number(self, variable: str) -> float:
         """The value of a variable."""
-        return float(self.lammps.extract_variable(variable))
+        return float(self._lammps.extract_variable(variable))
 
     @property
     def steps(self) -> int:
         """Time steps so far."""
-        return int(self.lammps.extract_global("ntimestep"))
+        return int(self._lammps.extract_global("ntimestep"))
 
-    @contextmanager
-    def group(self, name: str, disks: ArrayLike) -> Iterator[str]:
-        """A group of disks, which is gone afterwards."""
+    def group(self, name: str, disks: ArrayLike) -> None:
+        """Make a group of disks."""
         members = np.asarray(disks) + 1
-        self.command(f"group {name} id {int(members[0])}")
         for part in np.array_split(members, len(members) // 100 + 1):  # an input line has a limit
             self.command(f"group {name} id {' '.join(map(str, part))}")
-        yield name
-        self.command(f"group {name} delete")
-
-    @contextmanager
-    def all_but(self, disks: ArrayLike) -> Iterator[str]:
-        """The group of all other disks."""
-        with self.group("still", disks):
-            self.command("group mobile subtract all still")
-            yield "mobile"
-            self.command("group mobile delete")

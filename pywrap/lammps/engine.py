@@ -9,21 +9,19 @@ every rank sees the whole packing.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal
 
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
 from ...analysis import Packing
-from ...analysis.arrays import Floats
 from ...analysis.files.formats.lammps_data import box_heights
+from ...analysis.files.signal_files import write_table
 from ...analysis.responses.signals import Signal
 from .data_file import data_file, sort_contacts
-from .decks import Decks
 from .dynamics import Dynamics, Weakening
 from .instance import lammps_instance
 from .lammps_state import LammpsState
@@ -32,6 +30,9 @@ from .trial_state import Trial
 
 STEPS_A_LOOK = 1000
 """Time steps between two looks at the forces."""
+
+MOST_STEPS_OF_DYNAMICS = 10_000_000
+"""Time steps of dynamics, unless it is told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Relaxation:
     steps: int
 
 
-class Engine:
+class Engine(LammpsState):
     """A LAMMPS instance that contains one packing.
 
     Parameters
@@ -72,48 +73,65 @@ class Engine:
     """
 
     def __init__(self, packing: Packing, communicator: MPI.Comm | None = None, log: Path | None = None) -> None:
-        self.communicator = communicator or MPI.COMM_WORLD
-        self._decks = Decks(lammps_instance(self.communicator, log))
-        self._state = LammpsState(self._decks, packing)
-        self._kept: Trial | None = None
-        self._load(packing)
+        self.communicator, law = communicator or MPI.COMM_WORLD, packing.law
+        super().__init__(lammps_instance(self.communicator, log), packing)
+        self.kept: Trial | None = None  # the trial at which Newton's method has ended
+        with shared_folder(self.communicator) as folder:
+            data = folder / "packing.data"
+            if self.communicator.rank == 0:
+                data.write_text(data_file(packing))
+            self.communicator.barrier()
+            self.variables(
+                decks=decks_folder(), data=data, sides="f" if packing.box_length is None else "p", kn=law.kn, kt=law.kt,
+                mu=law.mu, exponent=law.exponent, history=law.history, fx=packing.fx, fy=packing.fy,
+                inertia=packing.inertia_factor, mass=float(packing.mass.min()),
+                diameter=2 * float(packing.radius.min()), precision="compensated" if packing.compensated else "double",
+                **({"cn": law.cn, "ct": law.ct} if law.damped else {}),
+            )  # fmt: skip
+            self.include("system.in")
+        self.scatter("rmass", packing.mass)
+        if law.frictional or packing.compensated:
+            self.begin_displacements()
+            self.command("run 0 post no")  # makes the fixes slips and low
+            self.restore(packing)
+        else:
+            self.scatter("f", 0.0 * self.gather("x", 3))  # until its first run LAMMPS leaves them uninitialised
 
     def __enter__(self) -> Engine:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._decks.lammps.close()
+    def __exit__(self, *error: object) -> None:
+        self._lammps.close()
 
     @property
     def lammps(self) -> Any:
         """The LAMMPS instance, for its data and for commands that the driver does not cover."""
-        self._state.end_displacements()
-        return self._decks.lammps
+        self.end_displacements()
+        return self._lammps
 
     @property
     def packing(self) -> Packing:
         """The present configuration, with its slips and its load."""
-        return self._state.read().packing
-
-    @property
-    def net_force(self) -> Floats:
-        """Forces in LAMMPS, (Fx.., Fy.., T/R..), shape (3N,), load included."""
-        return self._state.net_force()
-
-    def set_fx(self, fx: float) -> None:
-        """Set the force along x on each disk of the upper layer."""
-        self._state.set_fx(fx)
+        return self.read().packing
 
     def restore(self, packing: Packing) -> None:
         """Restore the disks, slips and load of a packing bitwise."""
-        self._state.end_displacements()
-        self._state.write(packing)
+        self.end_displacements()
+        self.write(packing)
         self.set_fx(packing.fx)
 
+    def trial_of(self, packing: Packing) -> Trial:
+        """The trial that was `kept` with this packing; without such a trial one of the packing, forces unknown."""
+        if self.kept is None or self.kept.packing is not packing:
+            self.kept = Trial.of(packing)
+        return self.kept
+
     def settle(
-        self, force_tolerance: float, gather: float = 1.0, viscosity: float | None = None, steps: int = 10_000_000
+        self,
+        force_tolerance: float,
+        gather: float = 1.0,
+        viscosity: float | None = None,
+        steps: int = MOST_STEPS_OF_DYNAMICS,
     ) -> None:
         """Settle a loose packing under the load (deck parts gather.in, bed.in).
 
@@ -128,13 +146,11 @@ class Engine:
         steps : int
             Largest number of time steps in each stage.
         """
-        self._state.end_displacements()
-        self._decks.variables(force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK)
-        if viscosity is not None:
-            self._decks.variables(viscosity=viscosity)
+        self.end_displacements()
+        self._limit(force_tolerance, steps, viscosity)
         if gather < 1:
-            self._decks.include("gather.in", gather=gather)
-        self._decks.include("bed.in")
+            self.include("gather.in", gather=gather)
+        self.include("bed.in")
 
     def damp(self, packing: Packing, force_tolerance: float, steps: int, viscosity: float | None = None) -> None:
         """Run viscously damped dynamics from a packing at rest (deck part damp.in), for at most `steps` steps.
@@ -142,19 +158,21 @@ class Engine:
         By default the viscosity is that of the previous call, or of `settle`.
         """
         self.restore(packing)
+        self._limit(force_tolerance, steps, viscosity)
+        self.include("damp.in")
+
+    def _limit(self, force_tolerance: float, steps: int, viscosity: float | None) -> None:
+        self.variables(force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK)
         if viscosity is not None:
-            self._decks.variables(viscosity=viscosity)
-        self._decks.include(
-            "damp.in", force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK
-        )
+            self.variables(viscosity=viscosity)
 
     def relax(
         self,
         force_tolerance: float,
         damping: float = 1.0,
         time_step: float | None = None,
-        chunk: int = 1000,
-        steps: int = 10_000_000,
+        chunk: int = STEPS_A_LOOK,
+        steps: int = MOST_STEPS_OF_DYNAMICS,
     ) -> Relaxation:
         """Overdamped relaxation (deck part relax.in).
 
@@ -171,56 +189,13 @@ class Engine:
         steps : int
             Largest number of time steps.
         """
-        self._state.end_displacements()
-        self._decks.command("variable relax_step delete")  # the variable of an earlier call
-        if time_step is not None:
-            self._decks.variables(relax_step=time_step)
-        start = self._decks.steps
-        self._decks.include(
-            "relax.in", force_tolerance=force_tolerance, damping=damping, chunk=chunk, chunks=steps // chunk
-        )
-        return Relaxation(
-            residual=self._decks.number("residual"),
-            status=str(self._decks.lammps.extract_variable("relaxed")),
-            steps=self._decks.steps - start,
-        )
-
-    def displace(self, base: Packing, displacement: Floats) -> Packing:
-        """Move the disks from a configuration along a straight path and advance the slips along it.
-
-        For LAMMPS the displacement is the motion in one time step of length one. The result does not depend on the
-        configuration before the call: any number of trials may start from one base, and each is bitwise independent of
-        the others.
-
-        Parameters
-        ----------
-        base : Packing
-            Where the path begins.
-        displacement : ndarray, shape (3N,)
-            (dx.., dy.., R dtheta..), length.
-
-        Returns
-        -------
-        Packing
-            The configuration at the end of the path; `net_force` has its forces.
-        """
-        return self.try_displacement(base, displacement).packing
-
-    def try_displacement(self, base: Packing, displacement: Floats) -> Trial:
-        """The same as `displace`, but returned as a `Trial`, for many displacements in turn."""
-        return self._state.displace(base, displacement)
-
-    def keep(self, trial: Trial) -> Packing:
-        """The packing of a trial, for displacements from this packing, with LAMMPS's own arrays to the bit."""
-        self._kept = trial
-        self._state.keep(trial)
-        return trial.packing
-
-    def trial_of(self, packing: Packing) -> Trial:
-        """The trial that `keep` got with this packing; without such a trial one of the packing, forces unknown."""
-        if self._kept is None or self._kept.packing is not packing:
-            self._kept = Trial.of(packing)
-        return self._kept
+        self.end_displacements()
+        self.command("variable relax_step delete")  # the variable of an earlier call
+        start, own = self.steps, {} if time_step is None else {"relax_step": time_step}
+        limits = {"force_tolerance": force_tolerance, "damping": damping, "chunk": chunk, "chunks": steps // chunk}
+        self.include("relax.in", **own, **limits)
+        status = str(self._lammps.extract_variable("relaxed"))
+        return Relaxation(self.number("residual"), status, self.steps - start)
 
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others.
@@ -228,11 +203,11 @@ class Engine:
         The output depends only on the configuration, not on its history.
         """
         bottom, top = box_heights(self.packing)
-        self._state.end_displacements()
-        self._decks.command(f"change_box all y final {bottom!r} {top!r} units box")
-        self._decks.command("reset_timestep 0")
+        self.end_displacements()
+        self.command(f"change_box all y final {bottom!r} {top!r} units box")
+        self.command("reset_timestep 0")
         with shared_folder(self.communicator) as folder:
-            self._decks.include("write.in", name=folder / "dump", fx=self._state.fx)
+            self.include("write.in", name=folder / "dump", fx=self.fx)
             self.communicator.barrier()
             if self.communicator.rank == 0:
                 sort_contacts(folder / "dump.contacts")
@@ -241,7 +216,7 @@ class Engine:
     @contextmanager
     def undamped(
         self,
-        time_step: float,
+        time_step: float | None = None,
         amplitude: float = 0.0,
         omega: float = 0.0,
         target: ArrayLike | None = None,
@@ -249,15 +224,17 @@ class Engine:
         signal: Signal | None = None,
         on: Literal["layer", "floor"] = "layer",
         drag_time: float | None = None,
+        spring: float | Literal["rigid"] | None = None,
+        stages: Sequence[tuple[float, float]] = (),
     ) -> Iterator[Dynamics]:
-        """Run dynamics from rest, with only the damping of the packing.
+        """Run dynamics from rest, with only the damping of the packing (deck part undamped.in).
 
         Parameters
         ----------
-        time_step : float
-            Time step of velocity Verlet, time.
+        time_step : float, optional
+            Time step of velocity Verlet, time; by default that of the deck part.
         amplitude : float
-            Amplitude a of the force a cos(omega t) along x on each disk of the target; 0 for none.
+            Amplitude a of the force a cos(omega t) along x on each disk of the target (push.in); 0 for none.
         omega : float
             Angular frequency of the force, 1 / time.
         target : array_like of int, optional
@@ -270,87 +247,58 @@ class Engine:
             Meaning of the signal: the force on each disk of the target, or the acceleration of the floor.
         drag_time : float, optional
             tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time; that of the packing by default.
-
-        Yields
-        ------
-        Dynamics
-            The dynamics, to be continued. Rattlers are held fixed, because nothing would stop them.
-        """
-        packing = self.packing
-        self._state.end_displacements()
-        dynamics = Dynamics(self._decks, self._state, packing, weakening)
-        with (
-            dynamics.integrate(time_step, packing.drag_time if drag_time is None else drag_time),
-            ExitStack() as forces,
-        ):
-            pushed = "top" if target is None else forces.enter_context(self._decks.group("pushed", target))
-            if amplitude != 0:
-                forces.enter_context(dynamics.push_cosine(amplitude, omega, pushed))
-            if signal is not None:
-                forces.enter_context(dynamics.apply_signal(signal, on, pushed, self.communicator))
-            dynamics.begin()
-            yield dynamics
-
-    @contextmanager
-    def driven(
-        self,
-        spring: float | Literal["rigid"],
-        stages: Sequence[tuple[float, float]],
-        signal: Signal | None = None,
-        on: Literal["layer", "floor"] = "layer",
-        time_step: float | None = None,
-    ) -> Iterator[Dynamics]:
-        """Run dynamics from rest in which a spring draws the upper layer, with the damping of the packing.
-
-        Parameters
-        ----------
-        spring : float or "rigid"
-            Stiffness for each disk of the layer, force / length; or the layer moves at the velocity of the far end.
+        spring : float or "rigid", optional
+            A spring whose far end moves draws the upper layer (spring.in): its stiffness for each disk of the layer,
+            force / length; or the layer moves at the velocity of the far end.
         stages : sequence of (float, float)
             Velocities of the far end, each with its time; the last one goes on.
-        signal, on : optional
-            A further force along x, as of `undamped`.
-        time_step : float, optional
-            That of the deck part undamped.in by default.
 
         Yields
         ------
         Dynamics
-            The dynamics, to be continued. All disks move, rattlers included: the layer comes past them.
+            The dynamics, to be continued. Rattlers are held fixed, because nothing would stop them; a layer that a
+            spring draws comes past them, and they move.
         """
-        packing = self.packing
-        self._state.end_displacements()
-        dynamics = Dynamics(self._decks, self._state, packing, None)
-        with (
-            dynamics.integrate(time_step, packing.drag_time, rattlers=True),
-            dynamics.draw(spring, stages),
-            ExitStack() as forces,
-        ):
-            if signal is not None:
-                forces.enter_context(dynamics.apply_signal(signal, on, "top", self.communicator))
-            dynamics.begin()
-            yield dynamics
-
-    def _load(self, packing: Packing) -> None:
-        law = packing.law
-        with shared_folder(self.communicator) as folder:
-            data = folder / "packing.data"
-            if self.communicator.rank == 0:
-                data.write_text(data_file(packing))
-            self.communicator.barrier()
-            self._decks.variables(
-                decks=decks_folder(), data=data, sides="f" if packing.box_length is None else "p", kn=law.kn, kt=law.kt,
-                mu=law.mu, exponent=law.exponent, history=law.history, fx=packing.fx, fy=packing.fy,
-                inertia=packing.inertia_factor, mass=float(packing.mass.min()),
-                diameter=2 * float(packing.radius.min()), precision="compensated" if packing.compensated else "double",
-            )  # fmt: skip
-            if law.damped:
-                self._decks.variables(cn=law.cn, ct=law.ct)
-            self._decks.include("system.in")
-        self._state.write_masses()
-        if law.frictional or packing.compensated:
-            self._state.begin_displacements()
-            self._decks.command("run 0 post no")  # makes the fixes slips and low
-            self.restore(packing)
-        else:
-            self._state.clear_forces()
+        packing, undo = self.packing, []  # commands after which the engine is as before, the last one first
+        self.end_displacements()
+        mobile, pushed = "all", "top"
+        if spring is None and len(packing.rattlers):
+            mobile = "mobile"
+            self.group("still", packing.rattlers)
+            self.command("group mobile subtract all still")
+            undo += ["group still delete", "group mobile delete"]
+        given = {"dt": time_step, "tau": packing.drag_time if drag_time is None else drag_time}
+        self.include("undamped.in", mobile=mobile, **{name: each for name, each in given.items() if each is not None})
+        if packing.law.damped:
+            law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
+            # `explain` takes the floor away
+            undo += [
+                'if "$(is_defined(fix,floor))" then "fix_modify floor damping no"',
+                f"pair_style mindlin/smooth {law}",
+            ]
+        undo += ["variable tau delete", "unfix move"]
+        if spring is not None:
+            far_end = {"velocity": stages[0][0]} if len(stages) == 1 else {}
+            if not far_end:
+                words = " ".join(f"{velocity!r} {time!r}" for velocity, time in stages)
+                self.command(f'variable protocol index "{words}"')
+            self.include("spring.in", spring=spring, **far_end)
+            self.command("variable protocol delete")
+            undo.append("unfix drive")
+        if target is not None:
+            pushed = "pushed"
+            self.group(pushed, target)
+            undo.append("group pushed delete")
+        if amplitude != 0:
+            self.include("push.in", amplitude=amplitude, omega=omega, target=pushed)
+            undo.append("unfix push")
+        if signal is not None:
+            with shared_folder(self.communicator) as folder:
+                if self.communicator.rank == 0:
+                    write_table(signal, folder / "signal.txt")
+                self.communicator.barrier()
+                self.include("signal.in", signal=folder / "signal.txt", scale=1.0, stretch=1.0, on=on, target=pushed)
+            undo.append("unfix force")
+        yield Dynamics(self, packing, weakening, drawn=spring is not None)
+        for command in reversed(undo):
+            self.command(command)

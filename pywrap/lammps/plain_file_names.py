@@ -12,7 +12,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -63,25 +63,22 @@ def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
 def plain_name(path: Path) -> Iterator[Path]:
     """A plain name of an existing file: its own name, or the name of a link to the file."""
     whole = Path(os.path.realpath(path))
-    if is_plain(str(whole)):
-        yield whole
-        return
-    with temporary_folder() as folder:
-        link = Path(folder) / f"file{whole.suffix if is_plain(whole.suffix) else ''}"
-        link.symlink_to(whole)
-        yield link
+    with ExitStack() as kept:
+        name = whole
+        if not is_plain(str(whole)):
+            name = (
+                Path(kept.enter_context(temporary_folder())) / f"file{whole.suffix if is_plain(whole.suffix) else ''}"
+            )
+            name.symlink_to(whole)
+        yield name
 
 
 @cache
 def decks_folder() -> Path:
     """The folder of the deck parts, or a link to it that lasts as long as this process."""
-    if is_plain(str(DECKS)):
-        return DECKS
-    folder = temporary_folder()
-    atexit.register(folder.cleanup)  # which keeps it until then
-    link = Path(folder.name) / "decks"
-    link.symlink_to(DECKS)
-    return link
+    kept = ExitStack()
+    atexit.register(kept.close)
+    return kept.enter_context(plain_name(DECKS))
 
 
 def move_files(folder: Path, stem: Path) -> None:

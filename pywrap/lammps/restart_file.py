@@ -6,13 +6,12 @@ dumps of write.in.
 
 from __future__ import annotations
 
+from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
 from ...analysis.files import formats
@@ -37,16 +36,14 @@ def read_restart(path: Path) -> Disks:
     """Disks of a restart."""
     if not begins_with(path, formats.RESTART_BEGINNING):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
-    lammps = lammps_instance(MPI.COMM_SELF, None)
-    try:
-        lammps.command("atom_modify map yes")
-        with plain_name(path) as name:
-            lammps.command(f"read_restart {name}")
-    except Exception as error:  # the LAMMPS module raises plain Exception
-        says = str(error).splitlines()[0].removeprefix("ERROR: ")
-        lammps.close()
-        raise PackingFileError(f"{path} is not read by LAMMPS {version('lammps')}: {says}.") from error
-    try:
+    with closing(lammps_instance(MPI.COMM_SELF, None)) as lammps:
+        try:
+            lammps.command("atom_modify map yes")
+            with plain_name(path) as name:
+                lammps.command(f"read_restart {name}")
+        except Exception as error:  # the LAMMPS module raises plain Exception
+            says = str(error).splitlines()[0].removeprefix("ERROR: ")
+            raise PackingFileError(f"{path} is not read by LAMMPS {version('lammps')}: {says}.") from error
         count = lammps.extract_global("nlocal")
         per_disk = {"id": "id", "type": "type", "radius": "radius", "mass": "rmass"}
         found = {name: lammps.numpy.extract_atom(atom) for name, atom in per_disk.items()}
@@ -56,22 +53,14 @@ def read_restart(path: Path) -> Disks:
         place = np.array(lammps.numpy.extract_atom("x")[:count], dtype=np.float64)
         columns |= dict(zip("xyz", place.T, strict=True))
         low, high, _, _, _, periodic, _ = lammps.extract_box()
-        box, groups = np.diag(np.subtract(high, low)), _groups(lammps, np.argsort(columns["id"]))
-        sides: dict[str, Any] = {"origin": np.array(low), "periodic": [*map(bool, periodic)]}
-        return in_plane(particles_of(path, columns, box, groups=groups, **sides))
-    finally:
-        lammps.close()
-
-
-def _groups(lammps: Any, order: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]]:
-    """Members of the groups, sorted by ID."""
-    # LAMMPS of 2024 counts groups without the places of deleted ones, and then crashes on these: no place is left empty
-    fill = [f"faultgouge_fill_{k}" for k in range(MOST_GROUPS - lammps.lib.lammps_id_count(lammps.lmp, b"group"))]
-    lammps.commands_list([f"group {name} empty" for name in fill])
-    groups = {}
-    for name in filter(None, lammps.available_ids("group")):
-        if name in fill:
-            continue
-        lammps.command(f"variable member atom gmask({name})")
-        groups[name] = np.array(lammps.extract_variable("member"))[: len(order)][order] != 0
-    return groups
+        # LAMMPS of 2024 counts groups without the places of deleted ones, and then crashes on these: no place is left
+        # empty
+        fill = [f"faultgouge_fill_{k}" for k in range(MOST_GROUPS - lammps.lib.lammps_id_count(lammps.lmp, b"group"))]
+        lammps.commands_list([f"group {name} empty" for name in fill])
+        groups, order = {}, np.argsort(columns["id"])
+        for name in (each for each in lammps.available_ids("group") if each not in ("", *fill)):
+            lammps.command(f"variable member atom gmask({name})")
+            groups[name] = np.array(lammps.extract_variable("member"))[:count][order] != 0
+    box = np.diag(np.subtract(high, low))
+    sides = [*map(bool, periodic)]
+    return in_plane(particles_of(path, columns, box, origin=np.array(low), periodic=sides, groups=groups))

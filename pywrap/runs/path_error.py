@@ -36,9 +36,8 @@ The stated error is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -53,6 +52,7 @@ from ..equilibria.quasistatic import Equilibrium
 from ..load_path import LoadPath
 
 Vanishes = Callable[[Packing], float]
+Known = dict[str | float, list[Equilibrium]]
 
 FEWEST_INCREMENTS = 4
 """Increments up to the onset from which on every second load may be left out."""
@@ -90,55 +90,6 @@ SECANT_TOLERANCE = 0.02
 """Last secant step, in units of the shift, at which the shift is known: it only has to tell the size of an error."""
 
 
-@dataclass(frozen=True)
-class PathError:
-    """The effect of the increments on one onset.
-
-    Attributes
-    ----------
-    shift : float
-        F_2h - F_h, force; nan where the pair is not found on the other path.
-    finer : float
-        F_h/2 - F_h, force, where contacts change and the other path is the coarser one; else 0, or nan as of `shift`.
-    moved : tuple of float
-        Onsets on the paths with moved loads less F_h, force, where contacts change; nan as of `shift`.
-    weight : float
-        S_2h / S_h - 1.
-    changes : bool
-        Whether contacts close, open, or reach or leave the Coulomb bound before the onset.
-    rounding : float
-        Uncertainty of either onset from rounding, force.
-    increment : float
-        Of the ramp at the onset, force.
-    """
-
-    shift: float
-    finer: float
-    moved: tuple[float, ...]
-    weight: float
-    changes: bool
-    rounding: float
-    increment: float
-
-    @property
-    def correction(self) -> float:
-        """Correction of F_h, force: 0 where the correction is no more than rounding, or contacts change."""
-        if self.changes or not abs(self.shift) > 2 * self.rounding:
-            return 0.0
-        return -self.shift / self.weight
-
-    @property
-    def error(self) -> float:
-        """Uncertainty of the onset from its path, force."""
-        hidden = 2 * self.rounding
-        if np.isnan([self.shift, self.finer, *self.moved]).any():
-            return self.increment
-        if not self.changes:
-            return UNCERTAINTY_OF_CORRECTION * (abs(self.shift) + hidden) / abs(self.weight)
-        part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-        return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
-
-
 def with_path_error(
     onset: Onset, path: LoadPath[Equilibrium], with_dashpots: Callable[[Packing], Packing] = lambda packing: packing
 ) -> Onset:
@@ -160,20 +111,18 @@ def with_path_error(
         keeps its own, and a `path_error` of None, where the ramp has no equilibrium at the onset that the search has
         found there.
     """
-    errors = PathErrors(path)
+    known: Known = {}
 
     def whole(window: Window) -> Window:
         if not window.fx_onset > path.equilibria[0].fx:
             return window
-        vanishes = (
-            growth_near(window.frequency, with_dashpots) if window.dissipative else squared_gap(window.eigenvalue)
-        )
+        growth = growth_near(window.frequency, with_dashpots)
+        vanishes = growth if window.dissipative else squared_gap(window.eigenvalue)
         try:
-            part = errors.error(window.fx_onset, vanishes, window.rounding_error)
+            correction, error = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
         except PATH_FAILURES:
             return window
-        edge = replace(window.onset, fx=window.fx_onset + part.correction)
-        return replace(window, onset=edge, path_error=part.error)
+        return replace(window, onset=replace(window.onset, fx=window.fx_onset + correction), path_error=error)
 
     undamped = onset.undamped
     if undamped is not None:
@@ -181,80 +130,77 @@ def with_path_error(
     return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
 
 
-class PathErrors:
-    """The errors of the onsets of one ramp, which have the paths through other loads in common for the most part.
+def path_error(
+    path: LoadPath[Equilibrium], fx: float, vanishes: Vanishes, rounding: float, known: Known | None = None
+) -> tuple[float, float]:
+    """The effect of the increments on one onset of a ramp: its correction and its uncertainty, force.
+
+    The correction is 0 where it is no more than rounding, or contacts change. The uncertainty is an increment where the
+    onset is not found on another path.
 
     Parameters
     ----------
     path : LoadPath
-        The ramp, at least up to the last onset.
+        The ramp, at least up to the onset.
+    fx : float
+        The onset as found on the path, force.
+    vanishes : callable
+        Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
+    rounding : float
+        Uncertainty of fx from rounding, force.
+    known : dict, optional
+        Equilibria of the other paths of this ramp by their names: onsets have these in common for the most part.
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the ramp has no equilibrium at fx.
     """
+    changed, known = contact_changes(path, fx), {} if known is None else known
+    ramp = np.array([*(each.fx for each in path.equilibria if each.fx < fx), fx])
+    steps = np.diff(ramp)
+    halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
+    few = len(changed) < FEWEST_INCREMENTS
+    other = halved if few else _thin_loads(ramp, changed)
+    increment, slope = float(steps.max()), None
 
-    def __init__(self, path: LoadPath[Equilibrium]) -> None:
-        self.path = path
-        self._states = [bearing_contacts(each.packing) for each in path.equilibria]
-        self._known: dict[str | float, list[Equilibrium]] = defaultdict(lambda: [path.equilibria[0]])
+    def shift(name: str | float, through: Floats) -> float:
+        """The onset on the path through some loads, less fx; the path goes on from its known equilibria."""
+        nonlocal slope
+        inner, before, common = through[1:-1], known.get(name, path.equilibria[:1]), 0
+        while common < min(len(inner), len(before) - 1) and before[common + 1].fx == inner[common]:
+            common += 1
+        there = LoadPath(path.solver, before[: common + 1], onward=False)
+        try:
+            for load in inner[common:].tolist():
+                there(load)
+                known[name] = [*there.equilibria]
+            root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
+        except PATH_FAILURES:
+            return np.nan
+        return root - fx
 
-    def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
-        """The effect of the increments on the onset at fx, whose rounding error is known.
+    coarse, weight = shift("coarser", other), float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
+    hidden = 2 * rounding
+    if not changed.any():
+        correction = -coarse / weight if abs(coarse) > hidden else 0.0
+        error = UNCERTAINTY_OF_CORRECTION * (abs(coarse) + hidden) / abs(weight)
+        return correction, increment if np.isnan(coarse) else error
+    finer = 0.0 if few else shift("finer", halved)
+    moved = [shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS]
+    if np.isnan([coarse, finer, *moved]).any():
+        return 0.0, increment
+    part = 1.0 if weight > 0 else 2.0  # the ramp is the coarser path of the two
+    return 0.0, max(part * abs(coarse), 2 * abs(finer), 2 * float(np.ptp([0.0, *moved]))) + hidden
 
-        Parameters
-        ----------
-        fx : float
-            The onset as found on the path, force.
-        vanishes : callable
-            Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
-        rounding : float
-            Uncertainty of fx from rounding, force.
 
-        Raises
-        ------
-        NoEquilibriumError
-            If the ramp has no equilibrium at fx.
-        """
-        changed = self.changes(fx)
-        ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
-        steps = np.diff(ramp)
-        halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
-        few = len(changed) < FEWEST_INCREMENTS
-        other = halved if few else _thin_loads(ramp, changed)
-        increment, slope = float(steps.max()), None
+def contact_changes(path: LoadPath[Equilibrium], fx: float) -> NDArray[np.bool_]:
+    """In which increments of a ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
 
-        def shift(name: str | float, through: Floats) -> float:
-            """The onset on the path through some loads, less fx; the path goes on from its known equilibria."""
-            nonlocal slope
-            inner, known = through[1:-1], self._known[name]
-            common = 0
-            while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
-                common += 1
-            there = LoadPath(self.path.solver, known[: common + 1], onward=False)
-            try:
-                for load in inner[common:].tolist():
-                    there(load)
-                    self._known[name] = [*there.equilibria]
-                root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
-            except PATH_FAILURES:
-                return np.nan
-            return root - fx
-
-        coarse = shift("coarser", other)
-        weight = float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
-        if not changed.any():
-            return PathError(coarse, 0.0, (), weight, False, rounding, increment)
-        finer = 0.0 if few else shift("finer", halved)
-        moved = (
-            shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS
-        )
-        return PathError(coarse, finer, tuple(moved), weight, True, rounding, increment)
-
-    def changes(self, fx: float) -> NDArray[np.bool_]:
-        """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
-
-        Raises NoEquilibriumError if the ramp has no equilibrium at fx.
-        """
-        before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
-        states = [*before, bearing_contacts(self.path(fx))]
-        return np.array([a != b for a, b in pairwise(states)])
+    Raises NoEquilibriumError if the ramp has no equilibrium at fx.
+    """
+    states = [bearing_contacts(each.packing) for each in path.equilibria if each.fx < fx]
+    return np.array([a != b for a, b in pairwise([*states, bearing_contacts(path(fx))])])
 
 
 def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
@@ -268,8 +214,7 @@ def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
     """Every second load; after an increment with a change the load is left out, before one it is kept."""
     kept, run = [True], 0
     for k in range(1, len(loads) - 1):
-        leave = bool(changed[k - 1]) or (run == 0 and not changed[k])
-        leave = leave and run < LONGEST_RUN
+        leave = (changed[k - 1] or (run == 0 and not changed[k])) and run < LONGEST_RUN
         run = run + 1 if leave else 0
         kept.append(not leave)
     return loads[[*kept, True]]

@@ -1,14 +1,12 @@
-"""The ramp of a scene: its equilibria one after the other, as run.h5 stores them; and what all runs of a scene share.
+"""The ramp of a scene: its equilibria one after the other, as run.h5 stores them.
 
 All functions are collective over the ranks of the communicator.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import wraps
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Concatenate, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -22,45 +20,9 @@ from ..settling.settle import settle
 from .ramp_loads import all_loads, way_to
 from .scene_path import next_equilibrium
 
-Options = ParamSpec("Options")
-Step = TypeVar("Step")
 
-
-class RunIterator(Generic[Step]):
-    """The steps of a run; its printed form says in an interactive session how to use the run."""
-
-    def __init__(self, name: str, steps: Iterator[Step]) -> None:
-        self._name, self._steps = name, steps
-
-    def __iter__(self) -> Iterator[Step]:
-        return self
-
-    def __next__(self) -> Step:
-        return next(self._steps)
-
-    def __repr__(self) -> str:
-        return (
-            f"<{self._name}: an iterator, which computes what is asked for: `for each in {self._name}(scene): ...`, or "
-            f"`*_, last = {self._name}(scene)`>"
-        )
-
-
-def run_of_scene(
-    function: Callable[Concatenate[Scene, Options], Iterator[Step]],
-) -> Callable[Concatenate[Scene | str | Path, Options], Iterator[Step]]:
-    """The function, which also takes the path of a scene, and whose iterator prints."""
-
-    @wraps(function)
-    def run(scene: Scene | str | Path, *args: Options.args, **options: Options.kwargs) -> Iterator[Step]:
-        name = function.__name__
-        return RunIterator(name, function(scene_of(scene, name), *args, **options))
-
-    return run
-
-
-@run_of_scene
 def ramp(
-    scene: Scene,
+    scene: Scene | str | Path,
     start: Equilibrium | None = None,
     communicator: MPI.Comm | None = None,
     dumps: Path | None = None,
@@ -102,6 +64,7 @@ def ramp(
     >>> print(f"{equilibrium.fx:.3f}")
     1.950
     """
+    scene = scene_of(scene, "ramp")
     settings = require_section(scene.ramp, "ramp")
     if start is None:
         start = settle(scene, communicator=communicator)
@@ -135,17 +98,16 @@ def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iter
     NoEquilibriumError
         If the packing flows.
     """
-    step = step_of(scene)
-    step = min(step, fx) or step  # one increment, where the first one of the ramp were too large
+    step = min(step_of(scene), fx) or step_of(scene)  # one increment, where the first one of the ramp were too large
     settings = scene.ramp or Ramp(step=step, until=step)
     settings = settings.model_copy(update={"step": step, "until": max(fx, step)})
-    bounded = scene.model_copy(update={"ramp": settings})
-    for last in ramp(bounded, communicator=communicator):
+    scene = scene.model_copy(update={"ramp": settings})
+    for last in ramp(scene, communicator=communicator):
         yield last
         if last.fx >= fx:
             return
-    with Engine(last.packing, communicator) as engine:
-        yield next_equilibrium(engine, last, fx, bounded)
+    with Engine(last.packing, communicator) as engine:  # the last multiple of the step is below fx, by rounding
+        yield next_equilibrium(engine, last, fx, scene)
 
 
 def step_of(scene: Scene) -> float:

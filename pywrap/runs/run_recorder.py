@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
@@ -13,16 +14,16 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import RunFile, solid_fraction
-from ...analysis.arrays import Floats, Indices
-from ...analysis.files.atomic_write import check_output, lock_output
+from ...analysis.arrays import Floats
+from ...analysis.files.atomic_write import check_output, lock_output, replace_whole
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
 from ..scenes.command_sections import COMMANDS
 from ..scenes.scene import SECTIONS, Scene
-from ..scenes.validation import SceneError
+from ..scenes.validation import SceneError, require_section
+from .drive import SERIES, DriveCheckpoint, DriveSample, DriveState, DriveStep, drive, slips_in
 from .undamped import Checkpoint, Sample, perturb, sample_steps
 
-R = TypeVar("R", bound="Record")
 S = TypeVar("S")
 T = TypeVar("T")
 Task = Literal["ramp", "perturb", "drive"]
@@ -31,9 +32,15 @@ STATES_OF_FILM, DISKS_OF_FILM = 300, 1000
 """Positions of an undamped run that a file stores unasked, at equal intervals of time, and of how many disks at the
 most: seven megabytes."""
 
+PENDING = "pending"
+"""Of the checkpoint of a driven run: how many of the last frames are pending states."""
+
 
 class Record:
     """The run.h5 of a scene, created or continued after an interruption.
+
+    Frames are equilibria, or the states of a driven run with the observables `time` and `displacement`, whose F_x is
+    the force of the spring.
 
     Parameters
     ----------
@@ -43,15 +50,16 @@ class Record:
         The scene; a file of another scene is refused.
     communicator : mpi4py.MPI.Comm, optional
         Rank 0 writes; all by default.
-    task : {"ramp", "perturb"}
-        Purpose of the file: a settled packing and its ramp, or an undamped run. A file of the other kind is refused.
+    task : {"ramp", "perturb", "drive"}
+        Purpose of the file: a settled packing and its ramp, an undamped run, or a driven run. A file of another kind is
+        refused.
     saved : callable, optional
         Called with a description of the contents and the path, each time the file has been saved.
 
     Attributes
     ----------
     last : Equilibrium or None
-        The last equilibrium in the file.
+        The equilibrium from which the run goes on: the last one in the file, or the first state of a driven run.
     remark : str
         On rank 0 what is not known of a file of an older version, in a sentence; empty for nothing.
 
@@ -63,20 +71,19 @@ class Record:
         If the file cannot be written, or another run is writing it.
     """
 
-    TASK: Task = "ramp"
-
     def __init__(
         self,
         path: Path,
         scene: Scene,
         communicator: MPI.Comm | None = None,
-        task: Task | None = None,
+        task: Task = "ramp",
         saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
-        self.path, self.scene, self.task = path, scene, task or self.TASK
+        self.path, self.scene, self.task = path, scene, task
         self.communicator = communicator or MPI.COMM_WORLD
         self.remark = ""
         self._file: RunFile | None = None
+        self._decided = 1  # frames of a driven run that are not pending
         self._said = saved
         self._alone = ExitStack()
         try:
@@ -86,41 +93,35 @@ class Record:
             raise
 
     def _resume(self) -> Equilibrium | None:
+        """Open the file, if it is there and of this scene and task; the equilibrium from which the run goes on."""
         check_output(self.path)
         self._alone.enter_context(lock_output(self.path))
         if not self.path.exists():
             return None
         file = RunFile(self.path, "a")
         stored, files = (json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files"))
-        difference = _difference(stored, self.scene.resolved(), self.task) or self._other_files(files)
+        difference = _difference(stored, self.scene.resolved(), self.task)
+        for key, content in ({} if difference else self.scene.digests()).items():
+            names = " and ".join(path.name for path in self.scene.files[key])
+            if key not in files:
+                self.remark = f"{self.path} does not say what {names} held ({key}) when it was begun: it may be another"
+            elif files[key] != content:
+                difference = f"{key}, {names}, has another content now"
+                break
+        task, cure = file.attributes.get("task", "ramp"), "give another name with -o, or delete it"
         if difference:
-            raise SceneError(
-                f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
-            )
-        task = file.attributes.get("task", "ramp")
+            raise SceneError(f"{self.path} holds a run of another scene ({difference}): {cure}")
         if task != self.task:
-            raise SceneError(f"{self.path} is a file of the command {task}: give another name with -o, or delete it")
+            raise SceneError(f"{self.path} is a file of the command {task}: {cure}")
         if len(file) == 0:
             return None
         self._file = file
         self._say_saved()
-        return self._stored_equilibrium(file)
-
-    def _other_files(self, stored: dict[str, str]) -> str:
-        """The first file of the scene whose content is not that from which the run was made; empty if all are."""
-        for key, content in self.scene.digests().items():
-            names = " and ".join(path.name for path in self.scene.files[key])
-            if key not in stored:
-                self.remark = f"{self.path} does not say what {names} held ({key}) when it was begun: it may be another"
-            elif stored[key] != content:
-                return f"{key}, {names}, has another content now"
-        return ""
-
-    def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
-        """The equilibrium from which the run goes on: the last one."""
-        row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
+        if task == "drive":
+            return Equilibrium.of(file.packing(0))
+        residual, floor, evaluations = (file.observable(name)[-1] for name in ("residual", "floor", "evaluations"))
         way = fallbacks(file).get(len(file) - 1)
-        return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
+        return Equilibrium(file.packing(), float(residual), float(floor), int(evaluations), way)
 
     @property
     def forces(self) -> Floats:
@@ -132,6 +133,11 @@ class Record:
         """Whether the run is complete; the same on all ranks."""
         return bool(raise_on_all_ranks(self.communicator, lambda: self._file is not None and self._file.complete))
 
+    @property
+    def slips(self) -> int:
+        """Slips of a driven run in the file so far; 0 on ranks that do not write."""
+        return 0 if self._file is None else len(slips_in(self._file))
+
     def finish(self) -> None:
         """Mark the run as complete."""
         if self._file is not None:
@@ -142,24 +148,36 @@ class Record:
             self._say_saved()
 
     def append(self, equilibrium: Equilibrium) -> None:
-        """Write one equilibrium."""
-        if self.communicator.rank == 0:
-            if self._file is None:
-                attributes = self._attributes() | {"solid_fraction": solid_fraction(equilibrium.packing)}
-                self._file = RunFile.create(self.path, equilibrium.packing, attributes)
-            file = self._file
-            with file.change():
-                file.complete = False
-                scene = json.dumps(json.loads(file.attributes.get("scene", "{}")) | self.scene.resolved())
-                if scene != file.attributes.get("scene"):  # a ramp goes on from a file of `settle`, or further
-                    file.put_attribute("scene", scene)
-                    known = json.loads(file.attributes.get("files", "{}"))
-                    file.put_attribute("files", json.dumps(self.scene.digests() | known))
-                file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
-                if equilibrium.way is not None:
-                    file.put_attribute("ways", json.dumps(fallbacks(file) | {len(file) - 1: equilibrium.way}))
-            self._say_saved()
+        """Write one equilibrium, or the packing from which a driven run starts."""
         self.last = equilibrium
+        if self.communicator.rank != 0:
+            return
+        scene, packing = self.scene.resolved(), equilibrium.packing
+        if self._file is None:
+            attributes: dict[str, str | int | float] = {
+                "task": self.task,
+                "scene": json.dumps(scene),
+                "files": json.dumps(self.scene.digests()),
+                "seed": getattr(self.scene.packing, "seed", -1),
+                "ranks": self.communicator.size,
+                "solid_fraction": solid_fraction(packing),
+                **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
+            }
+            self._file = RunFile.create(self.path, packing, attributes)
+        file = self._file
+        with file.change():
+            file.complete = False
+            known = {name: json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files")}
+            if (whole := json.dumps(known["scene"] | scene)) != file.attributes.get("scene"):
+                file.put_attribute("scene", whole)  # a ramp goes on from a file of `settle`, or further
+                file.put_attribute("files", json.dumps(self.scene.digests() | known["files"]))
+            if self.task == "drive":
+                file.append(packing, time=0.0, displacement=0.0)
+            else:
+                file.append(packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
+            if equilibrium.way is not None:
+                file.put_attribute("ways", json.dumps(fallbacks(file) | {len(file) - 1: equilibrium.way}))
+        self._say_saved()
 
     def undamped(
         self, scene: Scene, start: Equilibrium, name: str = "undamped", weakening: Weakening | None = None
@@ -182,30 +200,87 @@ class Record:
         Sample
             First the samples that are already in the file.
         """
-        assert scene.perturb is not None
-        dt, steps = sample_steps(scene.perturb, start.packing)
+        dt, steps = sample_steps(require_section(scene.perturb, "perturb"), start.packing)
         known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(name, Sample))
         yield from known
         if len(known) == len(steps):
             return
-        stored = _stored_steps(scene, len(start.packing), steps) if name == "undamped" else steps[:0]
-        shown = {step * dt for step in stored.tolist()}
-        samples: list[Sample] = []
-        motions: list[tuple[float, MotionState]] = []
+        wanted, filmed = None if scene.output is None else scene.output.trajectory, steps
+        if wanted is None:  # a film
+            filmed = np.unique(steps[np.searchsorted(steps, np.linspace(0, steps[-1], STATES_OF_FILM + 1)[1:])])
+            wanted = len(start.packing) <= DISKS_OF_FILM
+        shown = {step * dt for step in filmed.tolist()} if wanted and name == "undamped" else set()
+        samples, motions = list[Sample](), list[tuple[float, MotionState]]()
 
-        run = perturb(
-            scene,
-            start,
-            communicator=self.communicator,
-            weakening=weakening,
-            watch=lambda time, motion: motions.append((time, motion)) if time in shown else None,
-            keep=lambda reached: self._keep(name, samples, motions, reached),
-            resume=checkpoint,
-        )
-        for sample in run:
+        def watch(time: float, motion: MotionState) -> None:
+            motions.extend([(time, motion)] * (time in shown))
+
+        def keep(reached: Checkpoint | None) -> None:
+            self._keep(name, samples, reached, motions)
+            samples.clear()
+            motions.clear()
+
+        options: dict[str, Any] = {"weakening": weakening, "watch": watch, "keep": keep, "resume": checkpoint}
+        for sample in perturb(scene, start, communicator=self.communicator, **options):
             samples.append(sample)
             yield sample
-        self._keep(name, samples, motions, None)
+        keep(None)
+
+    def drive(self, others: Mapping[Path, Scene] | None = None) -> Iterator[DriveStep]:
+        """Run the scene's drive and write its rows and states; an interrupted run continues.
+
+        Parameters
+        ----------
+        others : mapping of Path to Scene, optional
+            Files of scenes that differ from this one in the signal alone, and have none or one that begins at the same
+            time. A file that does not exist is made when this run comes to that time, so that the run of the other
+            scene goes on from there, bitwise the same as from its beginning.
+
+        Yields
+        ------
+        DriveStep
+            Those that are not in the file yet.
+        """
+        assert self.last is not None
+        if self.complete:
+            return
+        known, resume = raise_on_all_ranks(self.communicator, self._reached_in_drive)
+        begins, time = require_section(self.scene.drive, "drive").at or 0.0, known[-1].time if resume else 0.0
+        steps: list[DriveStep] = []
+
+        def keep(reached: DriveCheckpoint | None) -> None:
+            nonlocal time
+            before, time = time, steps[-1].sample.time if steps else time
+            if others and self._file is not None and before <= begins < time:  # in the part that is written now
+                self._file.save()
+                for path, scene in others.items():
+                    with lock_output(path):
+                        if not path.exists():
+                            with replace_whole(path) as new:
+                                shutil.copyfile(self.path, new)
+                                with RunFile(new, "a") as other:
+                                    other.put_attribute("scene", json.dumps(scene.resolved()))
+            states, pending = [state for step in steps for state in step.states], reached.pending if reached else ()
+            state = reached and Checkpoint(reached.step, reached.state | {PENDING: np.array(len(pending))})
+            self._keep(SERIES, [step.sample for step in steps], state, states=[*states, *pending])
+            self._decided += len(states)
+            steps.clear()
+
+        for step in drive(self.scene, self.last.packing, known, resume, keep, self.communicator):
+            steps.append(step)
+            yield step
+        keep(None)
+
+    def _reached_in_drive(self) -> tuple[list[DriveSample], DriveCheckpoint | None]:
+        """Rows of the series so far, and where the driven run goes on."""
+        known, reached = self._known(SERIES, DriveSample)
+        if self._file is None or reached is None:
+            return known, None
+        self._decided = len(self._file) - int(reached.state.pop(PENDING, 0))
+        times, moved = (self._file.observable(name).tolist() for name in ("time", "displacement"))
+        frames = range(self._decided, len(self._file))
+        states = tuple(DriveState(times[k], moved[k], self._file.packing(k)) for k in frames)
+        return known, DriveCheckpoint(reached.step, reached.state, states)
 
     def _known(self, name: str, kind: Callable[..., S]) -> tuple[list[S], Checkpoint | None]:
         """Lines of a series so far, and the state after them."""
@@ -213,53 +288,52 @@ class Record:
             return [], None
         columns = self._file.series(name)
         rows = zip(*(columns[key].tolist() for key in columns), strict=True)
-        samples = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
         state = self._file.checkpoint
+        samples = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
         return samples, Checkpoint(int(state.pop("step")), state) if state else None
 
     def _keep(
-        self, name: str, samples: list[Any], motions: list[tuple[float, MotionState]], reached: Checkpoint | None
+        self,
+        name: str,
+        samples: Sequence[Any],
+        reached: Checkpoint | None,
+        motions: Sequence[tuple[float, MotionState]] = (),
+        states: Sequence[DriveState] | None = None,
     ) -> None:
-        """Write the samples and motions since the last checkpoint, together with this checkpoint."""
-        if self._file is not None and (samples or reached):
-            with self._file.change():
-                self._file.complete = False
-                if samples:
-                    columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
-                    self._file.append_series(name, **columns)
-                if motions:
-                    low = [motion.position_low for _, motion in motions if motion.position_low is not None]
-                    times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
-                    self._file.append_trajectory(times, positions, low or None)
-                state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
-                self._file.put_checkpoint(**state)
-            self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
-        samples.clear()
-        motions.clear()
+        """Write what came since the last checkpoint together with this checkpoint: lines of a series, frames of a
+        film, and states of a driven run in place of the pending ones."""
+        file = self._file
+        if file is None or not (samples or reached):
+            return
+        with file.change():
+            file.complete = states is not None and reached is None
+            if states is not None:
+                file.cut(self._decided)
+                for state in states:
+                    file.append(state.packing, time=state.time, displacement=state.displacement)
+            if samples:
+                columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
+                file.append_series(name, **columns)
+            if motions:
+                low = [motion.position_low for _, motion in motions if motion.position_low is not None]
+                times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
+                file.append_trajectory(times, positions, low or None)
+            state_now: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
+            file.put_checkpoint(**state_now)
+        self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
 
     def _say_saved(self, more: str = "") -> None:
         """Say what the stored file contains, if nothing is still to be written."""
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
+        what = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
+        if self.task == "drive":
+            what = f"{len(file)} state{'s' * (len(file) != 1)}, the last at t = {file.observable('time')[-1]:g}"
         goes_on = ", and is complete" if file.complete else "; the same command continues from there"
-        self._said(f"{self.path} holds {self._contents(file)}{more}{goes_on}", self.path)
+        self._said(f"{self.path} holds {what}{more}{goes_on}", self.path)
 
-    def _contents(self, file: RunFile) -> str:
-        """The contents of the file, in words."""
-        return f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
-
-    def _attributes(self) -> dict[str, str | int | float]:
-        return {
-            "task": self.task,
-            "scene": json.dumps(self.scene.resolved()),
-            "files": json.dumps(self.scene.digests()),
-            "seed": getattr(self.scene.packing, "seed", -1),
-            "ranks": self.communicator.size,
-            **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
-        }
-
-    def __enter__(self: R) -> R:
+    def __enter__(self) -> Record:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -270,15 +344,6 @@ class Record:
         self._alone.close()
 
 
-def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
-    """The steps at which an undamped run stores positions: some of the steps of its samples."""
-    wanted = None if scene.output is None else scene.output.trajectory
-    if wanted or wanted is False or disks > DISKS_OF_FILM:
-        return steps if wanted else steps[:0]
-    times = np.linspace(0, steps[-1], STATES_OF_FILM + 1)[1:]
-    return np.unique(steps[np.searchsorted(steps, times)])
-
-
 def fallbacks(file: RunFile) -> dict[int, str]:
     """Numbers of the equilibria that were not reached by halved increments, and the fallback of each."""
     return {int(number): way for number, way in json.loads(file.attributes.get("ways", "{}")).items()}
@@ -286,13 +351,13 @@ def fallbacks(file: RunFile) -> dict[int, str]:
 
 def raise_on_all_ranks(communicator: MPI.Comm, work: Callable[[], T]) -> T:
     """The result of rank 0, on all ranks; an error on rank 0 is raised on all ranks."""
-    result: tuple[T | None, Exception | None] = (None, None)
+    value, failure = None, None
     if communicator.rank == 0:
         try:
-            result = work(), None
+            value = work()
         except Exception as error:  # of whatever kind: the other ranks wait for it
-            result = None, error
-    value, failure = communicator.bcast(result)
+            failure = error
+    value, failure = communicator.bcast((value, failure))
     if failure is not None:
         raise failure
     return value
@@ -309,14 +374,14 @@ def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> s
     may_lack = {"relax", "ramp", "output"} if task == "ramp" else set()
     for section in sorted(stored.keys() | wanted.keys()):
         here, there = stored.get(section), wanted.get(section)
-        if section in may_lack and (here is None or there is None):
+        if section in may_lack and None in (here, there):
             continue
         if isinstance(here, dict) and isinstance(there, dict):
             fields = {key: field for model in SECTIONS.get(section, ()) for key, field in model.model_fields.items()}
-            usual = {key: field.default for key, field in fields.items() if not field.is_required()}
-            for key in sorted(here.keys() | there.keys()):
-                old, new = (each.get(key, usual.get(key)) for each in (here, there))
-                if (section, key) != ("ramp", "until") and old != new:
+            for key in sorted((here.keys() | there.keys()) - ({"until"} if section == "ramp" else set())):
+                usual = fields[key].default if key in fields and not fields[key].is_required() else None
+                old, new = here.get(key, usual), there.get(key, usual)
+                if old != new:
                     return f"{section}.{key} is {old} there and {new} here"
         elif here != there:
             return f"{section} is {'there' if here is not None else 'missing there'}"

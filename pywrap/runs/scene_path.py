@@ -16,12 +16,7 @@ from ..scenes.validation import require_section
 
 
 def next_equilibrium(
-    engine: Engine,
-    last: Equilibrium,
-    fx: float,
-    scene: Scene,
-    beside: Equilibrium | None = None,
-    onward: bool = True,
+    engine: Engine, last: Equilibrium, fx: float, scene: Scene, beside: Equilibrium | None = None, onward: bool = True
 ) -> Equilibrium:
     """The equilibrium at fx, from the last one by the scene's method; `beside` and `onward` as in `equilibrate`."""
     settings = require_section(scene.ramp, "ramp")

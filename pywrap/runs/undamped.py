@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -17,10 +18,10 @@ from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
 from ..lammps.engine import Engine
-from ..scenes.scene import Scene
+from ..scenes.scene import Scene, scene_of
 from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
-from .ramp import reach, run_of_scene
+from .ramp import reach
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
@@ -107,9 +108,8 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     return wanted
 
 
-@run_of_scene
 def perturb(
-    scene: Scene,
+    scene: Scene | str | Path,
     start: Equilibrium | None = None,
     samples: int = 2000,
     early: int = 200,
@@ -167,6 +167,7 @@ def perturb(
     >>> bool(6 < rate < 8)
     True
     """
+    scene = scene_of(scene, "perturb")
     settings = require_section(scene.perturb, "perturb")
     if start is None:
         if settings.fx is None:

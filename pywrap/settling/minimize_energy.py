@@ -107,13 +107,20 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimize_energy(packing)[0]
+    # damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega. Its omega is
+    # pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the pressure
+    diameter, height = (
+        2 * float(loose.radius.mean()),
+        float(np.pi * np.sum(loose.radius**2) / (_width(loose) * DENSITY)),
+    )
+    carried = loose.fy * loose.top.sum() * diameter / _width(loose)
+    stiffness = float(loose.law.normal_stiffness(loose.law.overlap_of_force(carried)))
+    viscosity = float(np.pi * SHEAR_SPEED * diameter * np.sqrt(loose.mass.mean() * stiffness) / height)
     report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
     if bed:
-        engine.settle(
-            TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STAGE_STEPS
-        )
+        engine.settle(TOLERANCES[0] * loose.fy, height / loose.position[:, 1].max(), viscosity, STAGE_STEPS)
     else:
-        engine.damp(loose, TOLERANCES[0] * loose.fy, STAGE_STEPS, _viscosity(loose))
+        engine.damp(loose, TOLERANCES[0] * loose.fy, STAGE_STEPS, viscosity)
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
@@ -144,10 +151,8 @@ def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) ->
     bool
         Whether the force is down at the rounding floor.
     """
-    best, least = packing, largest_force(packing)
-    sigma = _stiffest(packing) * min(1.0, least / packing.fy) * 1e-2
-    sigma = max(sigma, 1e-12 * _stiffest(packing))
-    here = packing
+    here, best, least = packing, packing, largest_force(packing)
+    sigma = max(_stiffest(packing) * min(1.0, least / packing.fy) * 1e-2, 1e-12 * _stiffest(packing))
     for _ in range(iterations):
         factors = _positive(here, sigma)
         if factors is None:
@@ -219,20 +224,3 @@ def finest_tolerance(packing: Packing) -> float:
 
 def _width(packing: Packing) -> float:
     return float(np.ptp(packing.position[:, 0])) if packing.box_length is None else packing.box_length
-
-
-def _height(packing: Packing) -> float:
-    """Height of the disks at the area fraction to which they are gathered."""
-    return float(np.pi * np.sum(packing.radius**2) / (_width(packing) * DENSITY))
-
-
-def _viscosity(packing: Packing) -> float:
-    """Damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega.
-
-    Its omega is pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the
-    pressure.
-    """
-    diameter = 2 * float(packing.radius.mean())
-    carried = packing.fy * packing.top.sum() * diameter / _width(packing)
-    stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
-    return float(np.pi * SHEAR_SPEED * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))

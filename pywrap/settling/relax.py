@@ -74,18 +74,12 @@ def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilib
         )
     with Engine(resting) as engine:
         found = equilibrate(engine, Equilibrium.of(resting), resting.fx)
-    return found, _what_moved(packing, found)
-
-
-def _what_moved(before: Packing, found: Equilibrium) -> str:
-    """Say in words how a packing has changed on its way to rest."""
     after = found.packing
-    moved = np.hypot(*nearest_image(after.position - before.position, after.box_length).T)
+    moved = np.hypot(*nearest_image(after.position - packing.position, after.box_length).T)
     far = int(np.sum(moved > MOTION_LIMIT * after.radius))
-    old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (before, after))
-    return (
-        f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is {found.residual:.2g}; "
+    old, new = (set(zip(p.contacts.i.tolist(), p.contacts.j.tolist(), strict=True)) for p in (packing, after))
+    return found, (
+        f"brought to rest: the largest force on a disk was {largest_force(packing):.3g} and is {found.residual:.2g}; "
         f"{far} of {len(after)} disks moved by more than {MOTION_LIMIT:.0%} of their radius, the farthest by "
-        f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); "
-        f"{counted(len(new - old), 'contact')} closed and {len(old - new)} opened"
+        f"{moved.max():.3g}; {counted(len(new - old), 'contact')} closed and {len(old - new)} opened"
     )

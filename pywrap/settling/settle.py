@@ -33,9 +33,8 @@ SETTLING_STIFFNESS = {1.5: 2e5, 1.0: 7e3}
 """k_n while a packing settles, by the exponent of the law (of others that of 3/2): the paper's, and of harmonic disks
 the stiffness 3/2 k_n delta^(1/2) that a contact of the paper's law has under the paper's load."""
 
-LEAST_BEARING_FRICTION = 1e-3
-"""Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of
-an overlap, and K has no tangential stiffness there."""
+MORE_IN_LAYER = "put more disks into the upper layer (leave packing.top out for as many as it takes)"
+CHECK_LOAD = "check law and load against those it was settled with, or bring it to rest by `faultgouge import --relax`"
 
 STARTS = 5
 """Loose starts of a seed that settle one after the other, until a layer stays on top. Of 100 disks under the paper's
@@ -91,57 +90,41 @@ def settle(
     scene = scene_of(scene, "settle")
     if bed is None:
         with show_progress(watch):
-            packing = settle_bed(scene, mu, communicator)
-    else:
-        packing = replace(bed, law=law_of(scene, scene.law.mus[0] if mu is None else mu))
-    packing = _in_arithmetic(packing, scene.precision)
+            bed = settle_bed(scene, mu, communicator)
+    packing = _in_arithmetic(replace(bed, law=law_of(scene, mu)), scene.precision)
     with Engine(packing, communicator) as engine:
         try:
             return equilibrate(engine, Equilibrium.of(packing), packing.fx)
         except NoEquilibriumError as error:
-            if 0 < (friction := packing.law.mu) < LEAST_BEARING_FRICTION:
-                cure = (
-                    f"friction of mu = {friction:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
-                )
-            elif isinstance(scene.packing, GeneratedPacking):
-                more = "put more disks into the upper layer (leave packing.top out for as many as it takes)"
-                cure = f"{more}, or try another seed"
-            else:
-                cure = (
-                    f"no equilibrium lies near where {scene.packing.file} has its disks: check law and load against "
-                    "those it was settled with, or bring it to rest by `faultgouge import --relax`"
-                )
+            cure = f"{MORE_IN_LAYER}, or try another seed"
+            if not isinstance(scene.packing, GeneratedPacking):
+                cure = f"no equilibrium lies near where {scene.packing.file} has its disks: {CHECK_LOAD}"
             says = f"the packing does not come to rest (a disk feels {packing.residual:.2g}): {cure}"
             raise NoEquilibriumError(says) from error
 
 
-def settle_bed(
-    scene: Scene,
-    mu: float | None = None,
-    communicator: MPI.Comm | None = None,
-) -> Packing:
+def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | None = None) -> Packing:
     """The settled packing of a scene, before its balance to the rounding floor; arguments as of `settle`.
 
     Scenes that settle without friction, and differ only in friction and in what follows, share it.
     """
-    law, section = law_of(scene, scene.law.mus[0] if mu is None else mu), scene.packing
+    law, section = law_of(scene, mu), scene.packing
     if not isinstance(section, GeneratedPacking):
         packing = _in_arithmetic(section.packing(law, **load_of(scene)), scene.precision)
         if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
             raise SceneError(
                 f"{section.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
-                f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "
-                "`faultgouge import --relax`"
+                f"fy = {scene.load.fy:g}: {CHECK_LOAD}"
             )
         return packing
     own, settling_law, fy = settling_units(scene, law)
+    settling_law = settling_law if own.settle_friction else replace(settling_law, mu=0.0)
     for draw in range(STARTS):  # the first of the seed's loose starts whose upper layer stays on top
         if draw:
             report_progress(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
         start = own.start(draw)
         assert start.top is not None
-        smooth = settling_law if own.settle_friction else replace(settling_law, mu=0.0)
-        loose = packing_of(start, smooth, start.top, **load_of(scene) | {"fy": fy})
+        loose = packing_of(start, settling_law, start.top, **load_of(scene) | {"fy": fy})
         with Engine(loose, communicator) as engine:
             packing = settle_loose(engine, loose)
         idle = idle_disks(packing)
@@ -151,7 +134,7 @@ def settle_bed(
         raise NoEquilibriumError(
             f"the upper layer sank through the bed from each of {STARTS} loose starts, and {len(idle)} of "
             f"{len(packing)} disks carry nothing: without friction only a layer that closes the box stays on top, so "
-            "put more disks into it (leave packing.top out for as many as it takes)"
+            f"{MORE_IN_LAYER}"
         )
     if not own.settle_friction:
         packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
@@ -162,34 +145,27 @@ def settle_bed(
             # those that touch nothing stay where they were put at the load of settling
             touching = [*packing.contacts.i, *packing.contacts.j]
             packing = clear_rattlers(packing, np.intersect1d(idle_disks(packing), touching))
-    # from the units of the packing to those of the scene
-    length, radius, contacts = 2 * min(section.radii), section.start(draw).radius, packing.contacts
-    found = replace(
-        packing,
-        position=length * packing.position,
-        radius=radius,
-        contacts=contacts.slipped(length * contacts.slip),
-        law=law,
-        # where disks rest does not depend on their masses
-        mass=section.mass_of(radius),
-        box_length=None if packing.box_length is None else section.width,
-        fy=scene.load.fy,
-    )
+    # from the units of the packing to those of the scene; where disks rest does not depend on their masses
+    length, radius = 2 * min(section.radii), section.start(draw).radius
+    place = {"position": length * packing.position, "radius": radius, "mass": section.mass_of(radius)}
+    contacts = packing.contacts.slipped(length * packing.contacts.slip)
+    box_length = None if packing.box_length is None else section.width
+    found = replace(packing, **place, contacts=contacts, box_length=box_length, law=law, fy=scene.load.fy)
     return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
 
 
 def shared_bed(scene: Scene) -> Packing | None:
     """The bed that all friction coefficients of a scene share; None if each has its own bed, or there is only one."""
-    alone = len(scene.law.mus) == 1
     own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
-    return None if alone or own else settle_bed(scene)
+    return None if own or len(scene.law.mus) == 1 else settle_bed(scene)
 
 
-def law_of(scene: Scene, mu: float) -> MindlinLaw:
-    cn, ct = (scene.damping.cn, scene.damping.ct) if scene.damping else (0.0, 0.0)
-    law, history = scene.law, scene.law.history
+def law_of(scene: Scene, mu: float | None = None) -> MindlinLaw:
+    """The law of a scene, with its first friction coefficient unless another one is given."""
+    law, damping, history = scene.law, scene.damping, scene.law.history
+    cn, ct = (damping.cn, damping.ct) if damping else (0.0, 0.0)
     memory = {"rescaled": history == "rescaled", "coulomb": history == "coulomb"}
-    return MindlinLaw(law.kn, law.kt, mu, law.exponent, cn, ct, **memory)
+    return MindlinLaw(law.kn, law.kt, law.mus[0] if mu is None else mu, law.exponent, cn, ct, **memory)
 
 
 def load_of(scene: Scene) -> dict[str, Any]:
@@ -201,11 +177,11 @@ def load_of(scene: Scene) -> dict[str, Any]:
 def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, MindlinLaw, float]:
     """The scene under which a packing settles, in `own_units`: with its own load, or that of packing.settle_at."""
     assert isinstance(scene.packing, GeneratedPacking)
-    at = scene.packing.settle_at
-    if at is None:
-        return own_units(scene.packing, law, scene.load.fy)
-    kn = at.kn or law.kn
-    return own_units(scene.packing, replace(law, kn=kn, kt=law.kt * (kn / law.kn)), at.fy or scene.load.fy)
+    kn, fy, at = law.kn, scene.load.fy, scene.packing.settle_at
+    if at is not None:
+        kn, fy = at.kn or kn, at.fy or fy
+        law = replace(law, kn=kn, kt=law.kt * (kn / law.kn))
+    return own_units(scene.packing, law, fy)
 
 
 def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:
@@ -234,18 +210,18 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     undamped = replace(law, cn=0.0, ct=0.0)
     if length == 1.0 and law.kn == stiffness:
         return packing, undamped, fy
-    radii = tuple(_round_numbers(radius / length) for radius in packing.radii)
-    section = packing.model_copy(update={"radii": radii, "width": _round_numbers(packing.width / length)})
+
+    def rounded(number: float) -> float:
+        return float(f"{number:.{DIGITS}g}")
+
+    sizes = {"radii": tuple(rounded(radius / length) for radius in packing.radii)}
+    section = packing.model_copy(update=sizes | {"width": rounded(packing.width / length)})
     tangential = Fraction(law.kt / law.kn).limit_denominator(1000)  # a share such as 2/7, to the bit
     kt = tangential.numerator * stiffness / tangential.denominator
     if not np.isclose(kt, law.kt / law.kn * stiffness, rtol=10.0**-DIGITS, atol=0.0):
-        kt = _round_numbers(law.kt / law.kn * stiffness)
-    own_fy = _round_numbers(fy / (law.kn * length**law.exponent) * stiffness)
+        kt = rounded(law.kt / law.kn * stiffness)
+    own_fy = rounded(fy / (law.kn * length**law.exponent) * stiffness)
     return section, replace(undamped, kn=stiffness, kt=kt), own_fy
-
-
-def _round_numbers(number: float) -> float:
-    return float(f"{number:.{DIGITS}g}")
 
 
 def _in_arithmetic(packing: Packing, precision: str) -> Packing:

@@ -21,7 +21,7 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from faultgouge.analysis.windows import Window
 from faultgouge.pywrap import Engine, Equilibrium, LoadPath, Scene, ramp_loads, scene_path, settle
-from faultgouge.pywrap.runs.path_error import PathErrors, with_path_error
+from faultgouge.pywrap.runs.path_error import contact_changes, with_path_error
 from research.tables import known_rows
 
 Dissipation = Literal["undamped", "damped"]
@@ -185,7 +185,7 @@ class FirstOnset:
 
     def changes(self, path: LoadPath[Equilibrium], fx: float) -> int:
         """Number of the increments before a load in which contacts change."""
-        return int(PathErrors(path).changes(fx).sum())
+        return int(contact_changes(path, fx).sum())
 
     def whole(self, path: LoadPath[Equilibrium], window: Window) -> tuple[float, float]:
         """The onset of a window, and the error that is stated: rounding and path together."""

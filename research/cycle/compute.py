@@ -30,8 +30,8 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import Floats, RunFile, Slip
-from faultgouge.pywrap import Equilibrium, Scene, settle_for_drive
-from faultgouge.pywrap.runs.drive import DriveRecord, slips_in
+from faultgouge.pywrap import Equilibrium, Record, Scene, settle_for_drive
+from faultgouge.pywrap.runs.drive import slips_in
 from faultgouge.studies.cycle import cycle_state
 from faultgouge.studies.result_rows import append_row
 from research.modes.sets import WIDTH
@@ -67,7 +67,7 @@ def scene(seed: int, law: str, spring: float = SPRING, disks: int = DISKS) -> Sc
 
 def run(path: Path, wanted: Scene) -> None:
     """Drive the layer of a scene, unless the file has that run to its end; an interrupted run continues."""
-    with DriveRecord(path, wanted) as record:
+    with Record(path, wanted, task="drive") as record:
         if record.last is None:
             record.append(Equilibrium.of(settle_for_drive(wanted)))
         for _ in record.drive():

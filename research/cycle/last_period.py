@@ -16,8 +16,8 @@ import numpy as np
 
 from faultgouge.analysis import Packing
 from faultgouge.analysis.responses.slips import find_slips
-from faultgouge.pywrap import settle_for_drive
-from faultgouge.pywrap.runs.drive import Plan, driven, layer_period
+from faultgouge.pywrap import Engine, settle_for_drive
+from faultgouge.pywrap.runs.drive import layer_period, steps_of
 from faultgouge.studies.cycle import cycle_state
 from research.cycle.compute import SPRING, scene
 
@@ -36,12 +36,15 @@ def rows_of(seed: int) -> Iterator[Row]:
     wanted = scene(seed, LAW)
     assert wanted.drive is not None
     start, series, packings = settle_for_drive(wanted), list[tuple[float, ...]](), list[Packing]()
-    with driven(wanted.drive, start) as (engine, dynamics):
-        plan, last = Plan.of(wanted.drive, start, dynamics.time_step), 0
-        for step in plan.steps(0):
+    draws = {"spring": wanted.drive.spring, "stages": wanted.drive.stages}
+    with Engine(start) as engine, engine.undamped(**draws) as dynamics:
+        dt, last = dynamics.time_step, 0
+        part, every, total = steps_of(wanted.drive, start, dt)
+        while last < total:
+            step = min(total, last - last % every + every, last - last % part + part)
             motion = dynamics.advance(step - last)
             force, displacement = dynamics.drawn
-            series.append((step * plan.dt, force, displacement, motion.kinetic_energy(start)))
+            series.append((step * dt, force, displacement, motion.kinetic_energy(start)))
             packings.append(replace(engine.packing, fx=force))
             last = step
     columns = np.array(series).T

@@ -115,10 +115,6 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: f
     smooth = np.geomspace(velocity.min(), velocity.max(), 500)
     axes.plot(smooth, mu_0 * share(law, smooth), color=INK, linewidth=0.8, label=r"law $\mu(v)$", zorder=1)
     axes.plot(velocity, mu, "o", color="C0", markersize=2.5, alpha=0.5, markeredgewidth=0, label="run")
-    for value, name in ((law.v0, "$v_0$"), (law.v_ss, "$v_{ss}$")):
-        if velocity.min() < value < velocity.max():
-            axes.axvline(value, color=INK, linewidth=0.6, linestyle=":")
-            axes.text(1.1 * value, 0.03, name, transform=axes.get_xaxis_transform())
     axes.xaxis.set_major_locator(LogLocator(numticks=7))
     axes.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
     return figure

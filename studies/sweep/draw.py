@@ -18,12 +18,6 @@ from ...figures.style import report_failure, save, styled
 from ..result_rows import Row
 from ..statistics import course
 
-STYLE_COLOURS = 6
-"""Colours of the style; more samples have those of a scale."""
-
-Samples = Mapping[str, Sequence[tuple[float, bool]]]
-"""The largest F_x up to which a scene has no window, and whether that is the onset; scenes by what is swept."""
-
 
 def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) -> str:
     """Save results.png and results.svg, and return words for that; none where rows have no onsets."""
@@ -44,14 +38,14 @@ def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) ->
 
 
 @styled
-def onsets_figure(samples: Samples) -> Figure:
-    """The share of scenes with an onset up to F_x, force per disk of the upper layer, a curve a sample."""
+def onsets_figure(samples: Mapping[str, Sequence[tuple[float, bool]]]) -> Figure:
+    """The share of scenes with an onset up to F_x, force per disk of the upper layer, a curve a sample: of each scene
+    the largest F_x up to which it has no window, and whether that is the onset."""
     figure = Figure(figsize=(3.4, 2.2 + 0.15 * len(samples)), layout="constrained")
     axes = figure.add_subplot(xlabel="$F_x$", ylabel="share with an onset", ylim=(0, 1))
-    scale = colormaps["viridis"](np.linspace(0, 0.9, len(samples)))
-    for number, (label, ends) in enumerate(samples.items()):
+    colours = colormaps["viridis"](np.linspace(0, 0.9, len(samples)))
+    for (label, ends), colour in zip(samples.items(), colours, strict=True):
         reach, found = np.transpose(ends)
-        colour = f"C{number}" if len(samples) <= STYLE_COLOURS else scale[number]
         axes.step(*course(reach, found.astype(bool)), where="post", color=colour, label=label)
     onsets = [found for ends in samples.values() for _, found in ends]
     axes.set_title(f"{len(onsets)} scenes: {sum(onsets)} with an onset, {onsets.count(False)} without", fontsize=8)

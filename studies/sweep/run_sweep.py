@@ -20,7 +20,6 @@ from concurrent.futures import Executor
 from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from mpi4py import MPI
@@ -38,7 +37,7 @@ from ...analysis.files.atomic_write import (
 from ...pywrap import SceneError
 from ..result_rows import Row, append_row, check_table, read_keyed_rows, write_tables
 from ..study import Progress, Say
-from .sweep_plan import Sweep, SweepPoint, points_of
+from .sweep_plan import Sweep, points_of
 from .workers import compute_points, open_executor
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
@@ -84,9 +83,9 @@ def sweep(
     >>> [round(row["result"]["fx_c"], 6) for row in rows]
     [1.935965, 1.672051]
     """
-    if not isinstance(request, (str, Path, Mapping)):
+    if not isinstance(request, str | Path | Mapping):
         raise SceneError(
-            f"sweep takes the path of a SWEEP.toml, or a mapping of its contents, and no {type(request).__name__}."
+            f"sweep takes the path of a SWEEP.toml, or a mapping as in it, and no {type(request).__name__}."
         )
     wanted = Sweep.from_mapping(request) if isinstance(request, Mapping) else Sweep.from_toml(request)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
@@ -142,7 +141,8 @@ def run_sweep(
         check_table(sweep.names, output)
         with lock_output(output):
             known = read_results(output / RESULTS_FILE)
-            missing = missing_points(points, known)
+            answered = {key for key, row in known.items() if row["says"] is None or row["final"]}
+            missing = [point for point in points if point.key not in answered]
             # the keys recognise the rows wherever the files of the scenes and of the task are
             keys = [point.key for point in sweep.points]
             about = {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
@@ -164,25 +164,6 @@ def _store(rows: Iterable[Row], path: Path) -> Iterator[Row]:
     for row in rows:
         append_row(path, {FORMAT_KEY: FORMAT, **row})
         yield row
-
-
-def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[SweepPoint]:
-    """The points to compute: those without a row, and those whose failure may have passed."""
-    answered = {key for key, row in known.items() if row["says"] is None or row["final"]}
-    return [point for point in points if point.key not in answered]
-
-
-def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> list[str]:
-    """Lines about the points that are not known yet: how many, and how long they take if the known rows are typical."""
-    scenes = [point for point in points if point.scene is not None]
-    settlings = {point.settling_key for point in scenes}
-    seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
-    time = "how long a scene takes is not known before the first of them: begin, and ask again"
-    if seconds:
-        one, hours = median(seconds), median(seconds) * len(scenes) / 3600
-        time = f"about {hours:.2g} h of one core, if a scene takes {one:.2g} s as in the {len(seconds)} rows there"
-    refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
-    return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
 
 
 def require_result(rows: Sequence[Row]) -> None:

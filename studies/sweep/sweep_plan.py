@@ -213,13 +213,13 @@ def _split_keys(key: str) -> list[str]:
 def _values(key: str, values: Any, name: str) -> list[Any]:
     """The values of a swept key: the elements of a list, or the whole numbers of "FIRST:LAST"."""
     names = _split_keys(key)
-    if isinstance(values, str):
-        match = re.fullmatch(r"\s*(\d{1,12})\s*:\s*(\d{1,12})\s*", values)
-        if not match or int(match[1]) > int(match[2]) or int(match[2]) - int(match[1]) >= MOST_POINTS:
-            raise SceneError(f'{name}: "{key}" = {values!r} is no range: give "FIRST:LAST", both included, or a list.')
+    match = re.fullmatch(r"\s*(\d{1,7})\s*:\s*(\d{1,7})\s*", values) if isinstance(values, str) else None
+    if match:
         values = list(range(int(match[1]), int(match[2]) + 1))
     if not isinstance(values, list) or not values:
-        raise SceneError(f'{name}: "{key}" = {values!r} is refused: give a list of values, or a range "FIRST:LAST".')
+        raise SceneError(
+            f'{name}: "{key}" = {values!r} is refused: give a list of values, or a range "FIRST:LAST", both included.'
+        )
     if len(names) > 1 and not all(isinstance(each, list) and len(each) == len(names) for each in values):
         raise SceneError(f'{name}: "{key}" names {len(names)} keys: each value is a list of {len(names)}.')
     return values

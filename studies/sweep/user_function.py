@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import importlib.util
 import inspect
 import json
 import re
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -80,7 +81,8 @@ def user_function(name: str) -> UserFunction:
     """
     place, _, wanted = name.rpartition(":")
     try:
-        module = _import_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
+        module = _import_file(Path(place)) if place.endswith(".py") else import_module(place)
+        code = code_digest(module, place)
     except (Exception, SystemExit) as error:
         raise SceneError(f'task = "{name}": {place} cannot be imported ({type(error).__name__}: {error})') from None
     function = getattr(module, wanted, None)
@@ -93,20 +95,17 @@ def user_function(name: str) -> UserFunction:
         raise SceneError(
             f'task = "{name}": {wanted} takes {count} arguments: a task is {wanted}(scene) or {wanted}(scene, settled)'
         )
-    return UserFunction(function, count == 2, code_digest(module, place))
+    return UserFunction(function, count == 2, code)
 
 
 def _import_file(path: Path) -> ModuleType:
     """The module of a file, which can import what lies beside it."""
     own = "faultgouge_task_" + re.sub(r"\W", "_", str(path))  # a name that no other file has
-    spec = importlib.util.spec_from_file_location(own, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[own] = module  # dataclasses of the file look themselves up there
+    module = sys.modules[own] = ModuleType(own)  # dataclasses of the file look themselves up there
+    module.__file__ = str(path)
     sys.path.insert(0, str(path.parent))
     try:
-        spec.loader.exec_module(module)
+        SourceFileLoader(own, str(path)).exec_module(module)
     finally:
         sys.path.remove(str(path.parent))
     return module
@@ -122,11 +121,7 @@ def code_digest(module: ModuleType, place: str) -> str:
         each = waiting.pop()
         if not each.is_file() or (name := str(each.relative_to(folder))) in code:
             continue
-        try:
-            tree = ast.parse(each.read_bytes())
-        except (SyntaxError, ValueError):  # a module that only some call imports, which will say so
-            code[name] = each.read_bytes().hex()
-            continue
+        tree = ast.parse(each.read_bytes())
         code[name] = ast.dump(tree)
         for node in ast.walk(tree):
             at, dotted = folder, list[str]()

@@ -3,7 +3,7 @@ of the user's.
 
 Points that settle to the same packing share it: the first point is distributed alone, and the others with the packing
 that the first has returned. The packing is bitwise the same wherever it was settled, so that no row depends on the
-workers. If a worker is killed, nothing is lost: its points are distributed again.
+workers. If a process is killed, nothing is lost: its point is computed again.
 
 Each point gives a row, even if it fails.
 """
@@ -15,7 +15,7 @@ import signal
 import sys
 import threading
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -66,7 +66,7 @@ class Processes(Executor):
     """Processes of this machine, each with its own interpreter; all of them end with this process.
 
     A thread has one process, so that one that is killed costs the work that it had, and nothing of the others; the
-    thread starts another one.
+    thread gives this work to another one.
     """
 
     def __init__(self, number: int) -> None:
@@ -83,24 +83,25 @@ class Processes(Executor):
         return self._threads.submit(self._run, partial(fn, *args, **kwargs))
 
     def _run(self, work: Callable[[], Any]) -> Any:
-        """The result of the work in the process of this thread."""
+        """The result of the work in the process of this thread, or in the next one where it is killed."""
         here = threading.get_ident()
-        if here not in self._pools:
-            # no fork: MPI and LAMMPS do not survive one
-            pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
+        for _ in range(1 + TRIES):
+            if here not in self._pools:
+                # no fork: MPI and LAMMPS do not survive one
+                pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
+                try:
+                    pool.submit(os.getpid).result()
+                except BrokenExecutor:
+                    raise WorkerError(
+                        "the workers end as they start; each reads a script anew that calls run_sweep with several "
+                        'workers, and the call stands below the line `if __name__ == "__main__":`'
+                    ) from None
+                self._pools[here] = pool
             try:
-                pool.submit(os.getpid).result()
+                return self._pools[here].submit(work).result()
             except BrokenExecutor:
-                raise WorkerError(
-                    "the workers end as they start; each reads a script anew that calls run_sweep with several "
-                    'workers, and the call stands below the line `if __name__ == "__main__":`'
-                ) from None
-            self._pools[here] = pool
-        try:
-            return self._pools[here].submit(work).result()
-        except BrokenExecutor:
-            self._pools.pop(here).shutdown(wait=False)
-            raise
+                self._pools.pop(here).shutdown(wait=False)
+        raise BrokenExecutor
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
@@ -144,30 +145,25 @@ def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint
                 row, bed = compute_point(task, point, bed, point is not group[-1])
                 yield row
         return
-    running: dict[Future[Any], tuple[SweepPoint, Packing | None, Sequence[SweepPoint]]] = {}
-    deaths = Counter[str]()
+    running: dict[Future[Any], Sequence[SweepPoint]] = {}
 
     def submit(point: SweepPoint, bed: Packing | None, waiting: Sequence[SweepPoint]) -> None:
         """Give a worker a point, with its packing if that is known, and the points that wait for the packing."""
-        running[pool.submit(compute_point, task, point, bed, bool(waiting))] = point, bed, waiting
+        running[pool.submit(compute_point, task, point, bed, bool(waiting))] = waiting
 
     try:
         for group in groups.values():
             submit(group[0], None, group[1:])
         while running:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                point, bed, waiting = running.pop(future)
+                waiting = running.pop(future)
                 try:
                     row, bed = future.result()
                 except BrokenExecutor:
-                    deaths[point.key] += 1
-                    if deaths[point.key] > TRIES or not isinstance(pool, Processes):
-                        raise WorkerError(
-                            "a worker was killed, possibly for lack of memory: give fewer --workers; the same command "
-                            "continues"
-                        ) from None
-                    submit(point, bed, waiting)
-                    continue
+                    raise WorkerError(
+                        "a worker was killed, possibly for lack of memory: give fewer --workers; the same command "
+                        "continues"
+                    ) from None
                 for each in waiting:
                     submit(each, bed, ())
                 yield row

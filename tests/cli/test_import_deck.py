@@ -147,22 +147,21 @@ def test_a_deck_without_particles(faultgouge_here, tmp_path):
 
 
 @pytest.mark.ranks
-def test_what_is_taken_on_one_rank_alone(faultgouge, tmp_path):
-    """K by differences of forces needs copies of the process, which several ranks cannot have."""
-    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise=0.0, steps=100))
-    said = faultgouge("import", "pour.in", ranks=2, code=1).stderr
-    assert "or take one rank and one thread, where K is found by differences of forces." in said
+def test_what_is_taken_on_one_rank_alone(faultgouge, faultgouge_here, tmp_path):
+    """A look needs a copy of the process. What several ranks have run is kept, and taken on one."""
+    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word=""))
+    said = faultgouge("import", "pile.in", "-o", "pile.h5", ranks=2, code=1).stderr
+    assert "which several ranks or threads cannot have: use one rank and one thread" in said
+    assert "The state, one step on, is kept in pile.restart, and the deck pile.restart.in" in said
+    assert "3 spheres, " in faultgouge_here("import", "pile.restart", "--relax", "-o", "pile.h5").stdout
 
 
 def test_regions_that_move(faultgouge_here, tmp_path):
     """A part of an intersection that rises with the time: its place is another one in each run."""
-    deck = POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000)
-    says = "Region floor of fix bin moves with v_rise: give this variable a constant before the last run"
-    (tmp_path / "pour.in").write_text(f"{deck}variable later equal 0\n")
+    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=6000))
     for more in ((), ("--relax",)):
-        before, *_, after = faultgouge_here("import", "pour.in", *more, code=1).stderr.splitlines()
-        assert says in before
-        assert says in after
+        said = faultgouge_here("import", "pour.in", *more, code=1).stderr
+        assert "LAMMPS's forces change with the time, though nothing moves: a load, a wall or a region follows" in said
 
 
 @pytest.mark.long
@@ -221,7 +220,6 @@ def test_any_model_in_a_region(faultgouge_here, tmp_path):
     assert found.operator_error < 1e-5
     assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "glue.h5", "--json").stdout)
     faultgouge_here("export", "glue.h5", "--mode", "1", "-o", "glue.vtp")
-    assert "no choice between" in faultgouge_here("import", "glue.in", "--slides", "-o", "slid.h5", code=1).stderr
 
 
 def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
@@ -310,7 +308,7 @@ AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
 REFUSED = [
     ("pile.in --kn 3", PILE, 2, "leave all options"),
     ("pile.in --balance nan", PILE, 2, "greater than or equal to 0"),
-    ("a.csv --balance 1", "", 2, "--balance are for a LAMMPS deck"),
+    ("a.csv --balance 1", "", 2, "--balance is for a LAMMPS deck"),
     ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),
     ("pile.lammps", PILE, 2, "LAMMPS decks (.in, in.NAME)"),
     ("lig.in", "atom_style granular\n", 1, "this is a deck of LIGGGHTS, whose"),
@@ -325,8 +323,8 @@ REFUSED = [
     ),
     ("mute.in", f"echo log\n{PILE}", 1, "no pair_style: leave `echo none` and `echo log` out"),
     # LAMMPS forgets histories there, since the compute has asked for another list of neighbours
-    ("lost.in", f"{ROW}{AFTER}", 1, "'write_restart pile.restart' stands after the last run"),
-    ("again.in", f"{DUMPED}undump all\nrerun d dump x y\n", 1, "'rerun d dump x y' puts the positions of a dump"),
+    ("lost.in", f"{ROW}{AFTER}", 1, "write_restart, rerun, reset_atoms, and delete_atoms without `compress no`, lose"),
+    ("again.in", f"{DUMPED}undump all\nrerun d dump x y\n", 1, "The packing moves"),
 ]
 
 
@@ -350,10 +348,10 @@ def test_ids_that_change_after_the_last_run(faultgouge_here, tmp_path, command):
     assert "5 disks, " in faultgouge_here("import", "rests.in", "-o", "rests.h5").stdout
     (tmp_path / "other.in").write_text(f"{deck}{command}\n")
     says = faultgouge_here("import", "other.in", "-o", "other.h5", code=1).stderr
-    assert f"'{command}' after the last run gives particles other IDs" in says
+    assert "The packing moves" in says
 
 
-def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
+def test_contacts_at_the_bound(faultgouge_here, tmp_path):
     """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
     deck = two_on_three()
     (tmp_path / "rough.in").write_text(deck)
@@ -362,41 +360,20 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
     used = np.linalg.norm(c.tangential_force, axis=1) / c.normal_force
     mu = used[~c.wall].max() * (1 - 1e-7)
     (tmp_path / "slid.in").write_text(f"{deck}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n")
-    found, verdicts = {}, set()
-    for acts, more in (("stick", ()), ("slide", ("--slides",))):
-        faultgouge_here("import", "slid.in", "-o", f"{acts}.h5", *more)
-        configuration = read_configuration(tmp_path / f"{acts}.h5")
-        count = int(configuration.contacts.at_bound.sum())
-        assert count > 0
-        assert configuration.contacts.sliding.sum() == (count if more else 0)
-        verdict, *_ = faultgouge_here("spectrum", f"{acts}.h5").stdout.partition("5 disks")
-        assert f"{count} of {len(c)} contacts are at Coulomb's bound: each slides on ahead" in verdict
-        verdicts.add(verdict)
-        found[acts] = json.loads(faultgouge_here("spectrum", f"{acts}.h5", "--json").stdout)["eigenvalues"]
-    assert found["stick"] != found["slide"]
-    assert len(verdicts) == 1  # of what the contacts do
+    said = faultgouge_here("import", "slid.in", "-o", "slid.h5").stdout
+    count = int(read_configuration(tmp_path / "slid.h5").contacts.at_bound.sum())
+    assert count > 0
+    assert f"{count} at Coulomb's bound, sticking in K" in said
+    verdict, *_ = faultgouge_here("spectrum", "slid.h5").stdout.partition("5 disks")
+    assert f"{count} of {len(c)} contacts are at Coulomb's bound: each slides on ahead" in verdict
 
 
-def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
-    """A wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025, one of hertz/history not."""
-    from faultgouge.analysis.files.configuration_file import read_configuration
-
-    deck = DECK.format(**FLAT, word="contacts")
-    hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
-    smooth = deck.replace("NULL 0.9 1 yplane 0", "NULL 0 1 yplane 0.01").replace("run 6000", "run 0")
-    (tmp_path / "smooth.in").write_text(smooth)  # a wall without friction has no tangential stiffness, whatever it says
-    assert "LAMMPS has" not in faultgouge_here("import", "smooth.in", "-o", "smooth.h5", "--balance", "1e9").stdout
-    for name, text in (("hertz", deck), ("hooke", hooke)):
-        (tmp_path / f"{name}.in").write_text(text)
-        said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5").stdout
-        found = read_configuration(tmp_path / f"{name}.h5")
-        c = found.contacts
-        measured = c.tangential_stiffness[c.wall].mean() / (2 / 7 * 1e3)
-        share = re.search(r"fix floor: LAMMPS has a tangential stiffness (\S+) times that of the line", said)
-        differs = name == "hooke" and abs(measured - 1) > 0.01
-        assert bool(share) == (len(found.remarks) == 2) == differs
-        assert found.remarks[-1] == "drag of fix drag (viscous) is left out"
-        assert found.remarks[-1] in faultgouge_here("spectrum", f"{name}.h5").stdout
-        if share:
-            assert float(share[1]) == pytest.approx(measured, rel=0.3)  # that of the contact of the median overlap
-        assert f"proof {found.proof:.1g}" in said
+def test_a_law_that_is_another_one_than_its_line_says(faultgouge_here, tmp_path):
+    """K has LAMMPS's: the wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025."""
+    deck = DECK.format(**FLAT, word="contacts").replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
+    (tmp_path / "hooke.in").write_text(deck)
+    said = faultgouge_here("import", "hooke.in", "-o", "hooke.h5").stdout
+    found = read_configuration(tmp_path / "hooke.h5")
+    assert found.proof < 1e-5
+    assert found.remarks == ("drag of fix drag (viscous) is left out",)
+    assert found.remarks[0] in said

@@ -84,16 +84,16 @@ def test_rigid_layer_moves_at_the_velocity_and_then_not_at_all(packing):
 
 
 def test_runs_that_the_spring_cannot_draw_are_refused(reference_packing):
-    with Engine(reference_packing(1.0)) as engine, engine.undamped(DT, drag_time=10.0) as dynamics:
+    with Engine(reference_packing(1.0)) as engine, engine.undamped(DT, drag_time=10.0):
         engine.lammps.command("fix drive top drive/spring rigid velocity 1.0")
         with pytest.raises(EngineError, match="rigid does not work with the drag of fix move"):
-            dynamics.begin()
-    with Engine(reference_packing(1.0)) as engine, engine.undamped(DT) as dynamics:
+            engine.command("run 0 post no")
+    with Engine(reference_packing(1.0)) as engine, engine.undamped(DT):
         engine.lammps.command("group some id 1:3")
         engine.lammps.command("fix drive some drive/spring 1 velocity 1.0")
-        dynamics.begin()
+        engine.command("run 0 post no")
         engine.lammps.command("set atom 1 type 1")
         engine.lammps.command("group some clear")
         engine.lammps.command("group some id 2:3")
         with pytest.raises(EngineError, match="had 3 disks when the spring began to draw, and has 2 now"):
-            dynamics.begin()
+            engine.command("run 0 post no")

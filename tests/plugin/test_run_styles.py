@@ -6,6 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from mpi4py import MPI
+from table_rows import rows_of
 
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.lammps.instance import lammps_instance
@@ -29,34 +30,21 @@ run_style respa 2 2
 GROWING = MODEL.replace("system.in", "growing.in")
 DUMP = "fix still all displace/disc\nrun 0\nwrite_dump all custom seen.dump id x y\nunfix still\n"
 RERUN = f"{MODEL}{DUMP}rerun seen.dump dump x y\n"
-RESPA, WITH_FRICTION = "does not work under run_style respa", "cannot be minimized, since its forces depend on the path"
 MINIMIZE, STILL = "minimize 0 1e-3 10 10\n", "fix still all displace/disc\nrun 0\n"
 GROWS = "variable d equal 1.0+step*dt\nfix grow all adapt 1 atom diameter v_d\nfix move all nve/disc 1.0\nrun 1\n"
-REFUSED = [
-    (f"{MODEL}run_style respa 2 2\nrun 0\n", f"pair mindlin/smooth {RESPA}"),
-    (f"{ALONE}fix move all nve/disc 1.0\nrun 10\n", f"fix nve/disc {RESPA}"),
-    (f"{ALONE}fix move all overdamped/disc 1.0 1.0\nrun 10\n", f"fix overdamped/disc {RESPA}"),
-    (f"{ALONE}fix push all addforce/signal cosine 1.0 1.0\nrun 10\n", f"fix addforce/signal {RESPA}"),
-    (f"{FRICTIONLESS}{MODEL}fix push top addforce/signal cosine 1.0 1.0\n{MINIMIZE}", "a minimizer has no time"),
-    (f"{FRICTIONLESS}{MODEL}comm_modify vel yes\nfix weak top weaken/friction 1 0 0 1 0 1\n{MINIMIZE}", WITH_FRICTION),
-    (f"{MODEL}{MINIMIZE}", f"pair mindlin/smooth with friction {WITH_FRICTION}"),
-    (f"{MODEL}{STILL}group gone id 50\ndelete_atoms group gone\nrun 0\n", "the slip history no longer belongs to its"),
-    (f"{MODEL}{STILL}reset_atoms id sort yes\nrun 0\n", "Atom IDs were renumbered"),
-    (f"{MODEL}replicate 2 1 1\n", "Cannot replicate with fixes that store per-atom quantities"),
-    (RERUN, "pair mindlin/smooth with friction cannot serve rerun"),
-    (f"{GROWING}{GROWS}", "fix grow of style adapt changes radii within a run"),
-]
+NAMES = ("FRICTIONLESS", "MODEL", "ALONE", "GROWING", "RERUN", "MINIMIZE", "STILL", "GROWS")
+REFUSED = rows_of("plugin/refused_run_styles.txt", **{name: globals()[name] for name in NAMES})
 
 
-@pytest.mark.parametrize(("script", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
-def test_it_is_refused_in_a_sentence(tmp_path, monkeypatch, script, says):
+@pytest.mark.parametrize(("parts", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
+def test_it_is_refused_in_a_sentence(tmp_path, monkeypatch, parts, says):
     """In this process, which saves the start of another one."""
     text = (DECKS / "system.in").read_text().replace("atom_style      sphere", "atom_style sphere 1")
     (tmp_path / "growing.in").write_text(text)
     monkeypatch.chdir(tmp_path)
     refused = pytest.raises(Exception, match=re.escape(says))
     with closing(lammps_instance(MPI.COMM_SELF, None)) as instance, refused:
-        instance.commands_string(script.replace(f"{DECKS}/growing.in", "growing.in"))
+        instance.commands_string("".join(parts).replace(f"{DECKS}/growing.in", "growing.in"))
 
 
 SERVED = {

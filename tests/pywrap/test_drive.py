@@ -11,20 +11,18 @@ from reference_layer import REFERENCE, toml
 from table_rows import rows_of
 
 from faultgouge.analysis import RunFile, read_dump
-from faultgouge.pywrap import EngineError, Equilibrium, Scene, SceneError, drive
+from faultgouge.pywrap import EngineError, Equilibrium, Record, Scene, SceneError, drive
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.drive import (
     CONFIDENCE,
     NOISES,
-    DriveRecord,
     advance_error,
     check_drive,
     clock_advance,
     settle_for_drive,
     slips_in,
 )
-from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
     "packing": {"file": str(REFERENCE)},
@@ -58,7 +56,7 @@ def settled(scene):
 
 def run_to_end(scene, path, parts=None):
     """Run a drive, or so many parts of it."""
-    with DriveRecord(path, scene) as record:
+    with Record(path, scene, task="drive") as record:
         if record.last is None:
             record.append(Equilibrium.of(settle_for_drive(scene)))
         for count, step in enumerate(record.drive()):
@@ -87,9 +85,9 @@ def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
         with RunFile(tmp_path / "cut.h5") as file:
             assert not file.complete
             assert file.checkpoint
-    with DriveRecord(tmp_path / "cut.h5", wanted) as record:
+    with Record(tmp_path / "cut.h5", wanted, task="drive") as record:
         assert list(record.drive())
-    with DriveRecord(tmp_path / "cut.h5", wanted) as record:  # it was killed before it could finish the file
+    with Record(tmp_path / "cut.h5", wanted, task="drive") as record:  # it was killed before it could finish the file
         assert record.complete
     whole, cut = datasets(tmp_path / "whole.h5"), datasets(tmp_path / "cut.h5")
     assert whole.keys() == cut.keys()
@@ -191,6 +189,38 @@ def test_states_are_packings_under_the_force_of_the_spring(scene, tmp_path):
         assert 0.6 < packing.fx < 0.8
 
 
+SLIPS = {
+    "packing": {"disks": 30, "seed": 4},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "damping": {"cn": 60.0, "ct": 17.0},
+    "drive": {"spring": 10.0, "velocity": 2e-3, "slips": 2},
+}
+
+
+def test_states_are_the_even_ones_and_both_ends_of_each_slip_wherever_the_run_is_cut():
+    wanted, kept, rows = Scene.from_mapping(SLIPS), [], []
+    start = settle_for_drive(wanted)
+
+    def run(*resumed, keep=None):
+        steps = []
+        for step in drive(wanted, start, *resumed, keep=keep):
+            steps.append(step)
+            rows.append(step.sample)
+        return steps, [(state.time, state.packing.fx) for step in steps for state in step.states]
+
+    steps, states = run(keep=lambda reached: kept.append((len(rows), reached)))
+    slips = [step.slip for step in steps if step.slip]
+    ends = {time for slip in slips for time in (slip.begins, slip.ends)}
+    even = {rows[count - 1].time for count, _ in kept}
+    assert len(slips) == 2
+    assert [time for time, _ in states] == sorted(even | ends | {rows[-1].time})
+    for slip in slips:  # cut off within a slip, which has pending states
+        count, reached = next(each for each in kept if rows[each[0] - 1].time > slip.begins)
+        assert reached.pending
+        assert run(rows[:count], reached)[1] == [each for each in states if each[0] >= reached.pending[0].time]
+
+
 def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
     wanted = scene(spring="rigid", protocol=[[1e-2, 1.0], [0.0, 0.5]])
     run_to_end(wanted, tmp_path / "drive.h5")
@@ -246,7 +276,7 @@ def test_runs_that_differ_in_the_signal_share_what_is_before_it(scene, tmp_path)
     wanted = scene(**THROWN, **SIGNAL)
     drives = {"without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
     scenes = {name: wanted.model_copy(update={"drive": drive}) for name, drive in drives.items()}
-    with DriveRecord(tmp_path / "with.h5", wanted) as record:
+    with Record(tmp_path / "with.h5", wanted, task="drive") as record:
         record.append(Equilibrium.of(settle_for_drive(wanted)))
         for _ in record.drive({tmp_path / f"{name}.h5": each for name, each in scenes.items()}):
             pass
@@ -284,7 +314,7 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
     def store(name, drive, slips):
         time = np.arange(0.0, 200.0, 0.1)
         moved = sum(size * np.clip((time - begin) / 3.0, 0.0, 1.0) for begin, size in slips)
-        with DriveRecord(tmp_path / name, wanted.model_copy(update={"drive": drive})) as record:
+        with Record(tmp_path / name, wanted.model_copy(update={"drive": drive}), task="drive") as record:
             record.append(Equilibrium.of(start))
             file = RunFile(tmp_path / name, "a")
             force = 10.0 * (1e-3 * time - moved)
@@ -294,7 +324,7 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 
     store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
     store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
-    with DriveRecord(tmp_path / "with.h5", wanted) as record:
+    with Record(tmp_path / "with.h5", wanted, task="drive") as record:
         assert record.slips == 3
     advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
     assert advance == pytest.approx(20.0, abs=0.2)

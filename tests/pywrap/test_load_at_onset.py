@@ -35,11 +35,6 @@ def test_between_the_onsets_of_the_weakened_and_of_the_static_friction():
         load_at_onset(scene, {1.0: onset(0.03), 0.8: onset(0.03)})
 
 
-def test_without_a_ramp_the_load_is_asked_for():
-    with pytest.raises(SceneError, match=r"perturb.fx is missing: give it, or a section \[ramp\]"):
-        Scene.from_mapping({name: section for name, section in SECTIONS.items() if name != "ramp"})
-
-
 @pytest.mark.slow
 def test_a_run_without_a_load_starts_beyond_the_onset(faultgouge_here, tmp_path):
     (tmp_path / "scene.toml").write_text(toml(SECTIONS))

@@ -18,7 +18,6 @@ from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import runfile
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
 from faultgouge.pywrap.runs import undamped
-from faultgouge.pywrap.runs.drive import DriveRecord
 from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
@@ -223,11 +222,7 @@ def test_a_run_does_not_go_on_from_files_of_another_content(equilibria, tmp_path
     monkeypatch.chdir(tmp_path)
     mapping = scene_of_files(tmp_path, more)
     scene = Scene.from_mapping(mapping, tmp_path, command=task)
-    record = (
-        (lambda: DriveRecord(tmp_path / "run.h5", scene))
-        if task == "drive"
-        else partial(Record, tmp_path / "run.h5", scene, task=task)
-    )
+    record = partial(Record, tmp_path / "run.h5", scene, task=task)
     with record() as run:
         run.append(equilibria[0])
     name = {"file": "packing.json", "signal": "signal", "top": "named"}[key.split(".")[1]]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge.analysis.files.signal_files import of_trace, read_signal
 from faultgouge.analysis.responses.forcing import floor_force, sampled_response
@@ -71,27 +72,9 @@ def test_two_columns_and_records_are_read(tmp_path):
         read_signal(path, "XYZ")
 
 
-@pytest.mark.parametrize(
-    ("text", "keys", "says"),
-    [
-        (None, {}, "cannot be read (No such file or directory)"),
-        ("0 1\n1 nan\n", {}, "line 2: 'nan' is no number"),
-        ("0 1 2\n1 2 3\n", {}, "line 1: it has 3 columns, and two are needed"),
-        ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude does not belong to a signal from a file"),
-        ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),
-        ("0 1\n1 1\n", {"channel": "EHZ"}, "has no channels"),
-        (None, {"signal": "pulse", "amplitude": 1.0}, "perturb.omega is missing"),
-        (None, {"signal": "pulse", "omega": 1.0}, "perturb.amplitude is missing"),
-        (
-            None,
-            {"signal": None, "on": "floor", "amplitude": 1.0, "omega": 1.0},
-            "perturb.on does not belong to a section without signal",
-        ),
-        (None, {"signal": None, "scale": 2.0}, "perturb.scale does not belong to a section without signal"),
-    ],
-)
-def test_scenes_with_a_bad_signal_are_refused(refused_scene, tmp_path, text, keys, says):
-    if text is not None:
-        (tmp_path / "signal.txt").write_text(text)
+@pytest.mark.parametrize(("lines", "keys", "says"), rows_of("pywrap/refused_signals.txt"))
+def test_scenes_with_a_bad_signal_are_refused(refused_scene, tmp_path, lines, keys, says):
+    if lines:
+        (tmp_path / "signal.txt").write_text("\n".join(lines))
     perturb = {"fx": 0.0, "time": 1.0, "signal": "signal.txt", **keys}
     assert says in refused_scene({**LEAST, "perturb": perturb}, tmp_path)

@@ -103,12 +103,9 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_her
     assert found.work > 0  # friction takes energy
     moved = layer_displacement(packings)[:, 0]
     assert found.remaining == moved[-1] - moved[5]
-    drawn = faultgouge_here("draw", "cycle.h5", "-o", "cycle.svg").stdout
-    assert "rattlers" not in drawn  # said of a packing
-    # a view of three loads has both turning points, too; all turning points and frames of either direction are there
+    # a view of three loads has both turning points, too
     for command, says in (
         ("view cycle.h5 --loads 3 -o cycle.html", "5 packings, "),
-        ("movie cycle.h5 --seconds 0.5 --dots 40 -o cycle.gif", "5 frames"),
         ("export cycle.h5 --frames all -o cycle.xyz", "26 frames of equilibria"),
     ):
         assert faultgouge_here(*command.split()).stdout.startswith(says)

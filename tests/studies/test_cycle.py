@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
-from faultgouge.pywrap import Equilibrium, Scene, SceneError
-from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
+from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError
+from faultgouge.pywrap.runs.drive import SERIES, settle_for_drive
 from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, with_spring
 
 SPRING, PACKING = 10.0, {"disks": 40, "seed": 2}
@@ -23,7 +23,7 @@ def make_run(path, **drive):
     scene = Scene.from_mapping(
         SMALL | {"damping": {"cn": 60.0, "ct": 17.0}, "drive": {"spring": SPRING} | drive, "packing": PACKING}
     )
-    with DriveRecord(path, scene) as record:
+    with Record(path, scene, task="drive") as record:
         record.append(Equilibrium.of(settle_for_drive(scene)))
         list(record.drive())
         record.finish()
@@ -79,7 +79,7 @@ def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
     assert read_configuration(tmp_path / "run.h5") == configuration != with_spring(configuration, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
     def states(folder, **options):
         cycle(slow, folder, **options)

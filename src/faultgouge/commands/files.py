@@ -73,9 +73,6 @@ def import_(
     columns: Annotated[
         str | None, Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
     ] = None,
-    slides: Annotated[
-        bool, Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
-    ] = False,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
     """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
@@ -104,18 +101,18 @@ def import_(
     if not given and file.suffix == ".restart" and kept.is_file():
         file = kept
     if not is_deck(file):
-        if slides or balance is not None:
-            raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+        if balance is not None:
+            raise typer.BadParameter("--balance is for a LAMMPS deck (.in): leave it out")
         yield from _disks(file, output, relax, given)
     elif given:
         raise typer.BadParameter(
-            f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
+            f"{file} is a deck, which says all by itself: leave all options but -o, --relax and --balance"
         )
     else:
-        yield from _deck(file, output, relax, slides, balance)
+        yield from _deck(file, output, relax, balance)
 
 
-def _deck(file: Path, output: Path, relax: bool, slides: bool, balance: float | None) -> Results:
+def _deck(file: Path, output: Path, relax: bool, balance: float | None) -> Results:
     """Store what a deck leaves; its largest stable time step beside Rayleigh's, and whether it is stable."""
     from faultgouge.analysis import rayleigh_timestep, stable_timestep
     from faultgouge.analysis.files.configuration_file import write_configuration
@@ -126,7 +123,7 @@ def _deck(file: Path, output: Path, relax: bool, slides: bool, balance: float | 
     text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
     allowed = BALANCE if balance is None else balance
     with status(f"{file}: LAMMPS runs") as show:
-        found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
+        found = run_deck(file, balance=allowed, relaxes=relax, keep=output, show=show)
     keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`")
     if not is_root():
         return

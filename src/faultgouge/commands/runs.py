@@ -261,10 +261,10 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
 
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
-    from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
+    from faultgouge.pywrap import Equilibrium, Record
+    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
 
-    with DriveRecord(output, scene, saved=_keeps) as record:
+    with Record(output, scene, task="drive", saved=_keeps) as record:
         if record.remark:
             say(record.remark)
         if record.last is None:

@@ -1,7 +1,5 @@
 """K and C by differences of LAMMPS's forces: beside the measured laws, beside LAMMPS's motion, and through a file."""
 
-import re
-
 import numpy as np
 import pytest
 from granular_packings import LAWS, command, head, instance
@@ -67,11 +65,12 @@ timestep 1e-3
     lmp.numpy.extract_atom("v")[:] = 0.0
     lmp.command("unfix slow")
     lmp.command("fix move all nve/sphere")
-    exact = [from_lammps(lmp, balance=np.inf, slides=slides) for slides in (False, True)]
-    assert exact[0].contacts.at_bound.sum() == 1
+    exact = from_lammps(lmp, balance=np.inf)
+    assert exact.contacts.at_bound.sum() == 1
     found = from_lammps(lmp, balance=np.inf, differences=True)
     assert set(found.ids[found.one_sided_particles]) == {1, 2}
-    mean = 0.5 * sum(stiffness_matrix(each) for each in exact)
+    slides = derive_frozen(exact, contacts=derive_frozen(exact.contacts, sliding=exact.contacts.at_bound))
+    mean = 0.5 * (stiffness_matrix(exact) + stiffness_matrix(slides))
     assert apart(stiffness_matrix(found), mean) < 1e-6
 
 
@@ -185,8 +184,6 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
     if kisses:  # nothing presses the sphere along x
         assert list(found.ids[found.one_sided_particles]) == [1]
         assert verdict.stable is None
-        left = re.search(r"LAMMPS itself, pushed by .* has (\S+) of the kinetic energy of the push", found.remarks[-1])
-        assert 0 < float(left[1]) < 1
     else:
         assert found.operator_error < 1e-6
         assert found.proof < 1e-5

@@ -270,7 +270,7 @@ def test_a_spring_in_aveforce_is_refused(cell):
     spring = "variable pull equal 0.05-10*(xcm(lid,x)-1.65)"
     lid = f"{spring}\nfix body lid nve\nfix push lid addforce 0 0 -2.0\nfix stiff lid aveforce v_pull 0.0 0.0"
     lmp = cell(lid)
-    with pytest.raises(NotTakenError, match=r"fix stiff aveforce adds the force v_pull.*fix addforce"):
+    with pytest.raises(NotTakenError, match=r"fix stiff aveforce drives particles by the force v_pull: .*fix addforce"):
         from_lammps(lmp)
 
 

@@ -1,7 +1,6 @@
 """The next run of a LAMMPS instance after looks at its packing: the same to the bit as without them."""
 
 import gzip
-import os
 import re
 import subprocess
 import sys
@@ -74,39 +73,10 @@ run 1995
     assert (tmp_path / "own.txt").read_text() == "what a user's script has written"
 
 
-def run_script(folder: Path, *arguments: object, script: str = "next_run.py", ranks: int = 1) -> None:
-    """Run a script, whose threads sleep while they wait, since other processes want the cores."""
-    words = [*on_ranks(ranks), sys.executable, Path(__file__).with_name(script), *map(str, arguments)]
-    passive = os.environ | {"OMP_WAIT_POLICY": "passive"}
-    done = subprocess.run(words, cwd=folder, env=passive, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-
-
 @pytest.mark.ranks
-@pytest.mark.parametrize(
-    ("law", "ranks"),
-    [
-        pytest.param("coulomb", 2, marks=pytest.mark.slow),
-        *(pytest.param(law, 2, marks=pytest.mark.long) for law in ("mindlin_rescale/force", "total", "rescaled")),
-        *(pytest.param("gran/hertz/history", ranks, marks=pytest.mark.long) for ranks in (2, 4)),
-    ],
-)
-def test_on_several_ranks(tmp_path, law, ranks):
-    """All contacts are in the configuration, whichever rank has them, and the next run is the same to the bit."""
-    run_script(tmp_path, law, 1, ranks=ranks)
-
-
-@pytest.mark.ranks
-@pytest.mark.long
-def test_with_two_threads(tmp_path):
-    """With the styles of LAMMPS's package OPENMP, for which a process with threads cannot be copied."""
-    run_script(tmp_path, "gran/hertz/history", 2)
-
-
-@pytest.mark.ranks
-@pytest.mark.parametrize(
-    ("ranks", "threads"), [(2, 1), *(pytest.param(1, each, marks=pytest.mark.long) for each in (1, 2))]
-)
-def test_runs_that_end_early_and_restarts(tmp_path, ranks, threads):
-    """LAMMPS skips the runs that follow, and the look has its zero steps all the same; no restart loses histories."""
-    run_script(tmp_path, threads, script="after_a_look.py", ranks=ranks)
+def test_several_ranks_are_refused(tmp_path):
+    """Their process cannot be copied; a deck is carried out all the same, and its state is kept."""
+    script = "from granular_packings import instance; from faultgouge import from_lammps; from_lammps(instance())"
+    words = [*on_ranks(2), sys.executable, "-c", script]
+    done = subprocess.run(words, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=600)
+    assert "which several ranks or threads cannot have: use one rank and one thread" in done.stderr

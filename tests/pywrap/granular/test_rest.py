@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, head
+from granular_packings import head
 
 BALL = (
     head("block -4 4 -4 4 -2 8")
@@ -90,15 +90,6 @@ def test_what_relax_cannot_reach_is_refused(lammps_with):
     for name, value in (("balance", np.nan), ("balance", -1.0), ("steps", 0)):
         with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
             relax(lmp, **{name: value})
-
-
-def test_a_wall_without_a_force_is_named(lammps_with):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    above = "create_atoms 1 single 0 0 1.49 units box"
-    lmp = lammps_with(BALL.format(z=0.5, wall="fix low all wall/reflect zlo -1.0", more=above))
-    with pytest.raises(NotTakenError, match=r"The packing moves: .*; fix low wall/reflect .* bears no weight: use fix"):
-        from_lammps(lmp)
 
 
 def test_a_thermostat_is_named(lammps_with):
@@ -190,32 +181,13 @@ def test_a_packing_of_rrespa(lammps_with):
 
 def test_a_force_that_swings_is_named(lammps_with):
     from faultgouge import relax
-    from faultgouge.analysis import NoEquilibriumError
+    from faultgouge.pywrap import NotTakenError
 
     plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
     swings = "variable f equal 0.05*sin(step*0.001)\nfix swing all addforce v_f 0 0"
     lmp = lammps_with(BALL.format(z=0.4999, wall=plane, more="") + swings)
-    with pytest.raises(NoEquilibriumError, match=r"^The packing .*; fix swing addforce may drive the packing\.$"):
+    with pytest.raises(NotTakenError, match="change with the time, though nothing moves: a load, a wall or a region"):
         relax(lmp, steps=10_000)
-
-
-def test_lines_and_planes_along_axes(lammps_with):
-    """What they hold has no row in K; the sphere rolls along y alone."""
-    from faultgouge.analysis import stiffness_matrix
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
-    held = "fix line all planeforce -1 0 0\nrun 0"
-    lmp = lammps_with(BALL.format(z=0.5 - WEIGHT / 1e4, wall=plane, more="") + held)
-    found = from_lammps(lmp)
-    assert found.proof < 1e-5
-    rows = np.flatnonzero(np.diff(stiffness_matrix(found).indptr))
-    assert list(rows) == [1, 2, 3, 4]  # y, z, and rotations about x and y
-    command(lmp, "unfix line\nfix line all lineforce 0 0 2")
-    assert list(np.flatnonzero(np.diff(stiffness_matrix(from_lammps(lmp)).indptr))) == [2, 3, 4]
-    lmp.command("fix line all lineforce 1 0 1")
-    with pytest.raises(NotTakenError, match="fix line lineforce has a direction along no axis"):
-        from_lammps(lmp, differences=True)
 
 
 def test_particles_that_leave_the_box_while_they_come_to_rest(lammps_with):

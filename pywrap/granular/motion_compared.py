@@ -1,0 +1,166 @@
+r"""LAMMPS's motion beside the exponential function of the operators of a Configuration.
+
+From rest with the velocities :math:`\mathbf v_0` small motion is
+
+.. math:: \begin{pmatrix} q \\ \dot q \end{pmatrix}(t) = e^{t G} \begin{pmatrix} 0 \\ \mathbf v_0 \end{pmatrix}, \qquad
+    G = \begin{pmatrix} 0 & 1 \\ -M^{-1} K & -M^{-1} C \end{pmatrix} .
+
+LAMMPS runs twice, with :math:`\pm \mathbf v_0`. Half of the difference has neither the motion by residual forces nor
+terms of second order in :math:`\mathbf v_0`. Left are the error of the time step h, of the order h^2, or h with
+dashpots; cubic terms of the forces; and, in `granular`, a history that is turned only once it has left the contact's
+plane by 1e-10 of Coulomb's bound. At the best amplitude the last two together are 1e-7 to 1e-5.
+
+Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
+K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`,
+
+.. math:: M \dot{\mathbf v} = \mathbf F - C \mathbf v, \qquad
+    \dot{\mathbf F} = -K \mathbf v + B\, |N \mathbf v| .
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import block_array, csr_array, diags_array
+from scipy.sparse.linalg import expm_multiply
+
+from ...analysis import BadInputError, Configuration, damping_matrix, largest_frequency, stiffness_matrix
+from ...analysis.arrays import Floats, Indices
+from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
+from ...analysis.operators.linearised_contacts import rescaling_operators
+from .granular_commands import NotTakenError
+from .look_in_a_copy import require_instance
+from .motion_proof import steps_in_a_copy
+
+STEP_ERROR = 1e-10
+"""Error of a step in the motion with two derivatives, as a share of the largest velocity."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionComparison:
+    """Velocities of LAMMPS and of the linearised packing after some time.
+
+    Attributes
+    ----------
+    difference : float
+        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing, with the root of the masses.
+    time, timestep : float
+        The time, a whole number of steps, and the step.
+    velocity, linear_velocity : ndarray, shape (E,)
+        Velocities of LAMMPS and of the linearised packing, times the root of the masses, of the coordinates that feel
+        a force.
+    periods : float
+        How many periods of the fastest vibration without dashpots the time has. A time far below one compares the
+        acceleration alone; slow vibrations are compared over a share of a period.
+    """
+
+    difference: float
+    time: float
+    timestep: float
+    velocity: Floats
+    linear_velocity: Floats
+    periods: float
+
+    def __float__(self) -> float:
+        return self.difference
+
+    def __str__(self) -> str:
+        return (
+            f"relative difference {self.difference:.2g} after t = {self.time:.4g}, {self.periods:.3g} periods of the "
+            "fastest vibration"
+        )
+
+
+def compare_motion(
+    lmp: Any,
+    configuration: Configuration,
+    time: float,
+    amplitude: float,
+    *,
+    timestep: float | None = None,
+    seed: int = 0,
+) -> MotionComparison:
+    """LAMMPS's undamped motion from small velocities against exp(t G).
+
+    Drag (fix viscous) is left out, dashpots at the contacts are in both. The instance does not change.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance, as it was when the configuration was taken; on one rank.
+    configuration : Configuration
+        Of :func:`~faultgouge.pywrap.from_lammps`.
+    time : float
+        How long, positive.
+    amplitude : float
+        Size of the random velocities, length / time, positive: so small that displacements stay far below all overlaps.
+        With `granular` not much smaller than that, or histories that do not turn are seen.
+    timestep : float, optional
+        Time step of LAMMPS, positive; that of the instance by default.
+    seed : int
+        Of the velocities.
+
+    Returns
+    -------
+    MotionComparison
+        `difference` is the relative difference; it is also the value of ``float(...)``.
+
+    Raises
+    ------
+    NotTakenError
+        If the instance has several ranks or threads, or other particles than the configuration, or none of these feels
+        a force.
+    BadInputError
+        If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
+    """
+    require_instance(lmp, "compare_motion")
+    step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
+    for name, value in (("time", time), ("timestep", step), ("amplitude", amplitude)):
+        if not 0 < value < np.inf:
+            raise BadInputError(f"{name} = {value:g} is refused: nothing would be compared; give a number above 0.")
+    steps = max(1, round(time / step))
+    stiffness = mass_weighted(stiffness_matrix(configuration), configuration)
+    active = active_coordinates(stiffness)
+    if not len(active):
+        raise NotTakenError("Nothing that moves has a contact: there is no motion to compare with.")
+    root = np.sqrt(configuration.coordinate_mass)
+    start = np.zeros(configuration.coordinates)
+    start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
+    there, back = (steps_in_a_copy(lmp, configuration, sign * start, step, steps) for sign in (1, -1))
+    velocity = (0.5 * (there - back) * root)[active]
+    linear = _linear_velocity(configuration, stiffness, active, (start * root)[active], step * steps)
+    difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
+    periods = step * steps * largest_frequency(configuration) / (2 * np.pi)
+    return MotionComparison(difference, step * steps, step, velocity, linear, periods)
+
+
+def _linear_velocity(
+    configuration: Configuration, stiffness: csr_array, active: Indices, start: Floats, time: float
+) -> Floats:
+    """Velocities after some time; these and `start` are multiplied by the root of the masses."""
+    a = stiffness[active][:, active]
+    g = mass_weighted(damping_matrix(configuration), configuration)[active][:, active]
+    # of (forces / omega, velocities), so that both halves weigh as much
+    omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
+    still = np.zeros_like(start)
+    system = csr_array(block_array([[None, -a / omega], [omega * diags_array(np.ones(len(start))), -g]]))
+    rates, forces = rescaling_operators(configuration)
+    if not forces.data.any():
+        return np.asarray(expm_multiply(time * system, np.concatenate([still, start])))[len(start) :]
+    from scipy.integrate import solve_ivp
+
+    weight = diags_array(1.0 / np.sqrt(configuration.coordinate_mass[active]))
+    n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active] / omega)
+
+    def slope(_: float, state: Floats) -> Floats:
+        """Each contact has its own derivative."""
+        return np.asarray(system @ state + np.concatenate([b @ np.abs(n @ state[len(start) :]), still]))
+
+    ends = []
+    for sign in (1, -1):
+        begin, error = np.concatenate([still, sign * start]), STEP_ERROR * np.abs(start).max()
+        found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=STEP_ERROR, atol=error)
+        if not found.success:
+            raise NotTakenError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
+        ends.append(found.y[len(start) :, 0])
+    return np.asarray(0.5 * (ends[0] - ends[1]))
