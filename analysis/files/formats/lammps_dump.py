@@ -192,9 +192,9 @@ def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None 
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]
     first, second = np.append(ids[i[touch]], ids[floor]), np.append(ids[j[touch]], 0 * ids[floor])
-    names = [name for name in ("slip", "slip_low") if name in pair]
-    slips = [np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for name in names]
-    return replace(found, given=given, slips=Slips(first, second, *slips, complete=True))
+    parts = {"slip": "slip", "low": "slip_low"}.items()
+    slips = {part: np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for part, name in parts if name in pair}
+    return replace(found, given=given, slips=Slips(first, second, **slips, complete=True))
 
 
 def _columns(path: Path, frame: DumpFrame, law: MindlinLaw, *needed: str) -> dict[str, Floats]:
