@@ -256,18 +256,14 @@ def _frame(packing: HasConfiguration, axis: Axis, images: _Images, followed: Ram
 
 def sentences_of(verdict: Stability) -> list[str]:
     """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound."""
-
-    def are(count: int | None, noun: str, kind: str, plural: str | None = None) -> list[str]:
-        return [f"{counted(count, noun, plural)} {'is' if count == 1 else 'are'} {kind}"] if count else []
-
-    undamped = verdict.undamped
-    found = are(undamped.pairs, "pair of eigenvalues", "complex", "pairs of eigenvalues")
-    found += are(undamped.negative, "eigenvalue", "negative")
-    says = [verdict.sentences[0], *([" and ".join(found)] if found else [])]
+    u, at = verdict.undamped, verdict.at_bound
+    counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
+    found = " and ".join(counted(count, noun) for noun, count in counts.items() if count)
     if found and verdict.dissipative:
-        says[1] = f"without dissipation {says[1]}, D would grow as exp({undamped.growth_rate:.3g} t)"
-    says += [*are(verdict.at_bound, "contact", "at Coulomb's bound"), *verdict.remarks]
-    return [f"{each[0].upper()}{each[1:]}." for each in says]
+        found = f"without dissipation {found}, D would grow as exp({u.growth_rate:.3g} t)"
+    bound = f"{counted(at, 'contact')} at Coulomb's bound" if at else ""
+    says = [verdict.sentences[0], found, bound, *verdict.remarks]
+    return [f"{each[0].upper()}{each[1:]}." for each in says if each]
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:

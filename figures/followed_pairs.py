@@ -7,7 +7,7 @@ complex, the two real modes of the last load that are closest to merging are fol
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,7 @@ SECONDS_OF_1000 = 18.0
 """Seconds that all modes of 1,000 disks take on one core; the time grows as the cube of the number of disks."""
 
 
-@dataclass(frozen=True, eq=False)
-class FollowedPair:
+class FollowedPair(NamedTuple):
     """A pair of eigenvalues along a ramp of S loads.
 
     Attributes
@@ -60,8 +59,7 @@ class FollowedPair:
         return 2 * np.abs(np.sqrt(self.eigenvalues[:, 0]).imag)
 
 
-@dataclass(frozen=True, eq=False)
-class RampEigenvalues:
+class RampEigenvalues(NamedTuple):
     """Eigenvalues along a ramp.
 
     Attributes

@@ -94,7 +94,7 @@ def test_the_page_opens_where_motion_grows_fastest_and_moves_along_the_load(page
     page = opened(page_of_loads)
     says = page.inner_text("#verdict")
     assert "Unstable: small motion grows, D as exp(" in says
-    assert "2 pairs of eigenvalues are complex." in says
+    assert "2 complex pairs." in says
     assert (page.inner_text("#where"), page.inner_text("#value")) == ("Fₓ = 0.16", "0.16")
     assert page.get_attribute("#verdict", "class") == "unstable"
     begin = mark(page)
@@ -166,9 +166,9 @@ def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, renumbered, 
     ("pairs", "negative", "says"),
     [
         (0, 0, []),
-        (1, 0, ["1 pair of eigenvalues is complex."]),
-        (2, 1, ["2 pairs of eigenvalues are complex and 1 eigenvalue is negative."]),
-        (0, 21, ["21 eigenvalues are negative."]),
+        (1, 0, ["1 complex pair."]),
+        (2, 1, ["2 complex pairs and 1 negative eigenvalue."]),
+        (0, 21, ["21 negative eigenvalues."]),
     ],
 )
 def test_a_number_has_its_noun(column, pairs, negative, says):

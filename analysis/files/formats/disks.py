@@ -14,7 +14,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +60,7 @@ def standard_names(columns: Mapping[str, Floats]) -> dict[str, Floats]:
     return named | {name: column for name, column in lower.items() if name not in ALIASES}
 
 
-@dataclass(frozen=True, eq=False)
-class Slips:
+class Slips(NamedTuple):
     """Slips of contacts, by the IDs of their disks.
 
     Attributes

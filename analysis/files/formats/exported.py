@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,8 +51,7 @@ class ModeVectors(NamedTuple):
     displacement: NDArray[np.complex128]
 
 
-@dataclass(frozen=True, eq=False)
-class Exported:
+class Exported(NamedTuple):
     """The columns of an export.
 
     Attributes

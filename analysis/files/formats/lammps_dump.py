@@ -18,11 +18,11 @@ snapshots in a file must have the same particles; otherwise a snapshot must be c
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
@@ -40,8 +40,7 @@ TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
 
 
-@dataclass(frozen=True, eq=False)
-class DumpFrame:
+class DumpFrame(NamedTuple):
     """One snapshot of a LAMMPS text dump.
 
     Attributes
