@@ -49,31 +49,13 @@ def test_deck(faultgouge_here, tmp_path, shape):
     assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
     assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
     if shape is ROUND:
-        assert "(.xyz) or ParaView (.pvd)" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
+        assert "a film shows disks" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
         too_large = faultgouge_here("export", "pile.h5", "--mode", "99", "-o", "pile.vtp", code=2).stderr
         assert "15 modes, counted from 0" in too_large
-        _check_film_of_spheres(faultgouge_here, tmp_path, configuration)
         return
     assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
     assert "no slips" in faultgouge_here("draw", "pile.h5", "--color", "slip", code=2).stderr
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.2", "-o", "mode.gif")
-
-
-def _check_film_of_spheres(faultgouge_here, tmp_path, configuration):
-    """Each frame has the spheres where the mode moves them, about where they rest, half a radius away at most."""
-    faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.xyz")
-    lines = (tmp_path / "mode.xyz").read_text().splitlines()
-    names = [each.split(":") for each in re.findall(r"(\w+:[SIR]:\d)", lines[1])]
-    ends = np.cumsum([int(size) for *_, size in names])
-    column = {name: slice(end - int(size), end) for (name, _, size), end in zip(names, ends, strict=True)}
-    frames = np.array(
-        [np.loadtxt(lines[k + 2 : k + 5], converters={0: lambda _: 0.0}) for k in range(0, len(lines), 5)]
-    )
-    assert len(frames) == 8
-    moved = frames[..., column["pos"]] - configuration.position
-    assert moved == pytest.approx(frames[..., column["displacement"]], abs=1e-15)
-    assert moved.sum(axis=0) == pytest.approx(0, abs=1e-15)
-    assert 0 < np.linalg.norm(moved, axis=2).max() <= 0.5 * configuration.radius.min() * (1 + 1e-15)
 
 
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
