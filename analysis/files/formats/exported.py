@@ -195,7 +195,8 @@ def read_back(
     if rows is None:
         return {"given": given}
     columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
-    slips = Slips(*columns[:2].astype(np.int64), columns[2], columns[3] if low else None, complete=True)
+    first, second = columns[:2].astype(np.int64)
+    slips = Slips(first, second, columns[2], columns[3] if low else None, complete=True)
     return {"given": given, "slips": slips}
 
 
