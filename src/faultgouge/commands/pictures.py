@@ -39,9 +39,7 @@ if TYPE_CHECKING:
     from ..analysis.has_configuration import HasConfiguration
 
 
-OF_MODE = (
-    "The unstable pair, or before the onset the two modes closest to merging; or mode N, counted by eigenvalue from 0."
-)
+OF_MODE = "The unstable pair, or the two modes closest to merging; or mode N, by eigenvalue from 0."
 OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
 OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
@@ -61,9 +59,7 @@ def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], st
 @command(f"{RAMPED} && faultgouge draw run.h5 --mode pair", writes="file", alone=True)
 def draw(
     file: PackingFile,
-    frame: Annotated[
-        int | None, Option(help="Number of the equilibrium, by default the last; negative numbers count from the end.")
-    ] = None,
+    frame: Annotated[int | None, Option(help="Number of the equilibrium; negative: from the last.")] = None,
     time: Time = None,
     mode: WhichMode = None,
     color: WhichColour = "mobilised",
@@ -131,13 +127,8 @@ def movie(
     color: WhichColour = "mobilised",
     seconds: Annotated[float, Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
     rate: Annotated[float, Option(min=1, max=60, help="Frames per second.")] = 10.0,
-    span: Annotated[
-        tuple[float, float] | None,
-        Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
-    ] = None,
-    dots: Annotated[
-        int | None, Option(min=30, max=800, help="Dots per inch: 110 for .gif, 1080 lines for .mp4.")
-    ] = None,
+    span: Annotated[tuple[float, float] | None, Option(metavar="T0 T1", help="Times of the run to show.")] = None,
+    dots: Annotated[int | None, Option(min=30, max=800, help="Dots per inch; 110 for .gif.")] = None,
     output: Annotated[Path | None, Option("-o", "--output", help=OF_FILM)] = None,
 ) -> Results:
     """Make a film of an undamped run, of a mode, or of a ramp.
@@ -190,17 +181,12 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             times = run.observable("time").tolist()
             shown = [k for k in shown if first <= times[k] <= last]
             if len(shown) < 2:
-                raise PackingFileError(
-                    f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}, and a "
-                    "film shows two or more: give a longer --span"
-                )
+                says = f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}"
+                raise PackingFileError(f"{says}, and a film shows two or more: give a longer --span")
             course = Course.of_drive(*driven, [times[k] for k in shown], first, last)
         packings = [run.packing(k) for k in shown]
     if len(packings) < 2:
-        raise PackingFileError(
-            f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
-            "with trajectory = true under [output]"
-        )
+        raise PackingFileError(f"{file} has one equilibrium and no trajectory: ask for a mode with --mode")
     return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven is not None)
 
 
