@@ -61,7 +61,7 @@ def test_distances_count_from_the_onset_with_dissipation(tmp_path):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_map_is_the_same_on_two_ranks(faultgouge, tmp_path):
     more = {"friction": {"v0": 1e-7, "v_ss": "10 v0"}, "packing": SMALL["packing"] | {"seed": 2}}
     more["trigger"] = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}
