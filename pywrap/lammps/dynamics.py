@@ -5,9 +5,7 @@ Friction may fall with velocity (weaken.in).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from ctypes import c_int
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
@@ -15,10 +13,7 @@ import numpy as np
 
 from ...analysis import Packing
 from ...analysis.arrays import Floats
-from .lammps_state import LammpsState
-
-PERIODS_AWAY = "image"
-"""LAMMPS's name, in the state of a drawn layer, for how many periods each disk has moved from its beginning."""
+from .lammps_state import PERIODS_AWAY, LammpsState
 
 
 class MotionState(NamedTuple):
@@ -116,7 +111,7 @@ class Dynamics:
         return MotionState(position, low, velocity[:, :2], spin, float(friction))
 
     def work(self, steps: int) -> tuple[MotionState, float]:
-        """Go on by so many steps, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
+        """The last steps of a run, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
         engine = self._engine
         # windows of fix ave/time end at multiples of their length
         engine.command(f"reset_timestep {(self.steps + steps - 1) // steps * steps}")
@@ -125,27 +120,17 @@ class Dynamics:
         first = engine.number("power_now")
         motion = self.advance(steps)
         mean, last = float(self._lammps.extract_fix("power", 0, 0)), engine.number("power_now")
-        spin = ["uncompute work_spin"] * self._packing.law.frictional
-        for command in ("unfix power", "uncompute power", "variable power delete", *spin):
-            engine.command(command)
         return motion, (mean * steps + 0.5 * (first - last)) * self.time_step
 
-    @contextmanager
-    def halt_above(self, velocity: float) -> Iterator[None]:
-        """End the run once the upper layer is faster than this, length / time (deck part halt.in)."""
+    def halt_above(self, velocity: float) -> None:
+        """End every run from here on once the upper layer is faster than this, length / time (deck part halt.in)."""
         self._engine.include("halt.in", halt_velocity=float(velocity))
         self._engine.command("run 0 post no")
-        yield
-        self._engine.command("unfix halt")
-        self._engine.command("uncompute halt_velocity")
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
-        state = self._engine.checkpoint()
-        if self._drawn:
-            periods = self._lammps.gather_atoms(PERIODS_AWAY, 0, 3)
-            state[PERIODS_AWAY] = np.array(periods, dtype=np.float64).reshape(-1, 3)
-        return state
+        periods = {PERIODS_AWAY: self._engine.gather(PERIODS_AWAY, 3)} if self._drawn else {}
+        return self._engine.checkpoint() | periods
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
         """Continue from the state of a run at a step; the run may be that of another engine.
@@ -153,10 +138,7 @@ class Dynamics:
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.
         """
-        self._engine.write_checkpoint({name: values for name, values in state.items() if name != PERIODS_AWAY})
-        if PERIODS_AWAY in state:
-            counts = state[PERIODS_AWAY].astype(np.int32).ravel()
-            self._lammps.scatter_atoms(PERIODS_AWAY, 0, 3, (c_int * len(counts))(*counts.tolist()))
+        self._engine.write_checkpoint(state)
         self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._engine.command(f"reset_timestep {step}")
         self._engine.command("run 0 post no")

@@ -129,42 +129,36 @@ class Engine(LammpsState):
     def settle(
         self,
         force_tolerance: float,
+        start: Packing | None = None,
         gather: float = 1.0,
         viscosity: float | None = None,
         steps: int = MOST_STEPS_OF_DYNAMICS,
     ) -> None:
-        """Settle a loose packing under the load (deck parts gather.in, bed.in).
+        """Settle a loose packing under the load by viscously damped dynamics (deck parts gather.in, bed.in, damp.in).
 
         Parameters
         ----------
         force_tolerance : float
             Largest force on a disk.
+        start : Packing, optional
+            A packing at rest from which damped dynamics go on; by default a bed is laid first, of the present disks.
         gather : float
             Fraction of its height to which the loose packing is first brought down evenly; 1 for not at all.
         viscosity : float, optional
-            Viscosity of the damping, mass / time; by default that of the decks.
+            Viscosity of the damping, mass / time; by default that of the previous call, or of the decks.
         steps : int
             Largest number of time steps in each stage.
         """
-        self.end_displacements()
-        self._limit(force_tolerance, steps, viscosity)
+        if start is None:
+            self.end_displacements()
+        else:
+            self.restore(start)
+        own = {} if viscosity is None else {"viscosity": viscosity}
+        limits = {"force_tolerance": force_tolerance, "chunk": STEPS_A_LOOK, "chunks": steps // STEPS_A_LOOK}
+        self.variables(**limits, **own)
         if gather < 1:
             self.include("gather.in", gather=gather)
-        self.include("bed.in")
-
-    def damp(self, packing: Packing, force_tolerance: float, steps: int, viscosity: float | None = None) -> None:
-        """Run viscously damped dynamics from a packing at rest (deck part damp.in), for at most `steps` steps.
-
-        By default the viscosity is that of the previous call, or of `settle`.
-        """
-        self.restore(packing)
-        self._limit(force_tolerance, steps, viscosity)
-        self.include("damp.in")
-
-    def _limit(self, force_tolerance: float, steps: int, viscosity: float | None) -> None:
-        self.variables(force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK)
-        if viscosity is not None:
-            self.variables(viscosity=viscosity)
+        self.include("bed.in" if start is None else "damp.in")
 
     def relax(
         self,

@@ -71,13 +71,9 @@ def load_plugin(instance: Any) -> None:
         with plain_name(plugin) as name:
             instance.command(f"plugin load {name}")
     if not instance.has_style("pair", "mindlin/smooth"):
-        trouble = (
-            f"does not take the plugin {plugin}, which was built for another release, MPI or size of atom IDs"
-            if plugin.is_file()
-            else f"has no plugin, since {plugin} is not there"
-        )
+        why = "was built for another release, MPI or size of atom IDs" if plugin.is_file() else "is not there"
         raise EngineError(
-            f"LAMMPS {instance.version()} {trouble}: build the plugin for this LAMMPS by pip install "
-            "--no-build-isolation --force-reinstall --no-deps faultgouge, or name the folder of one that was by "
-            "FAULTGOUGE_PLUGIN"
+            f"LAMMPS {instance.version()} does not take the plugin {plugin}, which {why}: build the plugin for this "
+            "LAMMPS by pip install --no-build-isolation --force-reinstall --no-deps faultgouge, or name the folder of "
+            "one that was by FAULTGOUGE_PLUGIN"
         )

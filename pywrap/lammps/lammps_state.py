@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts, Packing, touching
 from ...analysis.arrays import Floats
@@ -26,8 +27,8 @@ from .contact_graph import ContactGraph
 from .decks import Decks
 from .trial_state import Trial
 
-LAMMPS_DOUBLE = 1
-"""The number for doubles in LAMMPS's library."""
+PERIODS_AWAY = "image"
+"""LAMMPS's name for how many periods each disk has moved from its beginning along x, y and z: integers."""
 
 LOW_COLUMNS, STATE_COLUMNS = 5, 10
 """Columns of fix ``low``, and of fix displace/disc."""
@@ -266,19 +267,20 @@ class LammpsState(Decks):
 
     def gather(self, name: str, columns: int) -> Floats:
         """An array of LAMMPS (x, v, f ..., f_FIX, d_NAME), shape (N, columns)."""
-        values = np.empty((len(self._static), columns))
+        values = np.empty((len(self._static), columns), np.int32 if name == PERIODS_AWAY else np.float64)
         self._transfer("gather", name, values, columns)
-        return values
+        return values.astype(np.float64, copy=False)
 
     def scatter(self, name: str, values: Floats) -> None:
         """Write an array of LAMMPS, shape (N,) or (N, columns); arrays of fixes take effect with the next run."""
-        whole = np.ascontiguousarray(values, dtype=np.float64)
+        whole = np.ascontiguousarray(values, dtype=np.int32 if name == PERIODS_AWAY else np.float64)
         self._transfer("scatter", name, whole, values.size // len(self._static))
 
-    def _transfer(self, way: str, name: str, values: Floats, columns: int) -> None:
+    def _transfer(self, way: str, name: str, values: NDArray[Any], columns: int) -> None:
         library, instance = self._lammps.lib, self._lammps.lmp
         function = f"lammps_{way}" if name[:2] in ("f_", "d_") else f"lammps_{way}_atoms"
-        getattr(library, function)(instance, name.encode(), LAMMPS_DOUBLE, columns, values.ctypes.data)
+        double = int(name != PERIODS_AWAY)  # LAMMPS's number of the type
+        getattr(library, function)(instance, name.encode(), double, columns, values.ctypes.data)
         if library.lammps_has_error(instance):
             raise self._lammps._lammps_exception
 

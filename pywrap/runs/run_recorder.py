@@ -60,8 +60,6 @@ class Record:
     ----------
     last : Equilibrium or None
         The equilibrium from which the run goes on: the last one in the file, or the first state of a driven run.
-    remark : str
-        On rank 0 what is not known of a file of an older version, in a sentence; empty for nothing.
 
     Raises
     ------
@@ -81,7 +79,6 @@ class Record:
     ) -> None:
         self.path, self.scene, self.task = path, scene, task
         self.communicator = communicator or MPI.COMM_WORLD
-        self.remark = ""
         self._file: RunFile | None = None
         self._decided = 1  # frames of a driven run that are not pending
         self._said = saved
@@ -102,10 +99,8 @@ class Record:
         stored, files = (json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files"))
         difference = _difference(stored, self.scene.resolved(), self.task)
         for key, content in ({} if difference else self.scene.digests()).items():
-            names = " and ".join(path.name for path in self.scene.files[key])
-            if key not in files:
-                self.remark = f"{self.path} does not say what {names} held ({key}) when it was begun: it may be another"
-            elif files[key] != content:
+            if files.get(key, content) != content:  # an older version kept none
+                names = " and ".join(path.name for path in self.scene.files[key])
                 difference = f"{key}, {names}, has another content now"
                 break
         task, cure = file.attributes.get("task", "ramp"), "give another name with -o, or delete it"

@@ -18,8 +18,9 @@ from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
 from ..lammps.engine import Engine
+from ..scenes.run_sections import Perturb
 from ..scenes.scene import Scene, scene_of
-from ..scenes.sections import Friction, Perturb
+from ..scenes.sections import Friction
 from ..scenes.validation import SceneError, require_section
 from .ramp import reach
 
@@ -175,8 +176,7 @@ def perturb(
         *_, start = reach(scene, settings.fx, communicator)
     packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
-    everyone = range(len(packing)) if settings.target == "all" else settings.target
-    target = None if everyone == "top" else [int(disk) for disk in everyone]
+    target = None if settings.target == "top" else range(len(packing)) if settings.target == "all" else settings.target
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
 
     part = max(SHORTEST_PART, -(-int(settings.time / dt) // MOST_PARTS))  # by the length of the run alone

@@ -36,12 +36,6 @@ class SettlingLoad(Section):
     fy: Annotated[Positive | None, FORCE] = None
     kn: Annotated[Positive | None, STIFFNESS] = None
 
-    @model_validator(mode="after")
-    def _not_empty(self) -> "SettlingLoad":
-        if self.fy is None and self.kn is None:
-            raise refusal_sentence("", "has nothing in it: give fy, or kn, or both, as in {fy = 3.0, kn = 2e5}")
-        return self
-
 
 class GeneratedPacking(Section):
     """[packing] from a seed: a loose start of disks of several sizes in equal shares, settled under the load.
@@ -108,11 +102,10 @@ class GeneratedPacking(Section):
             says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
             raise refusal_sentence("width", says)
         if not self.periodic and (self.top < self.disks or row > self.width):
-            raise refusal_sentence(
-                "periodic",
-                "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
-                "leave it out, or give a pile that stands by itself as packing.file",
+            says = (
+                "= false leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
             )
+            raise refusal_sentence("periodic", says)
         return self
 
     def start(self, draw: int = 0) -> Disks:

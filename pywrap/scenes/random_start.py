@@ -40,21 +40,8 @@ def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
     return min(disks, max(1, round(max(LAYER * disks, side_by_side))))
 
 
-def _generator(seed: int, draw: int) -> np.random.Generator:
-    """Random numbers of a seed, of which each draw has its own."""
-    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())
-    return np.random.Generator(np.random.PCG64(draws))
-
-
 def random_start(
-    disks: int,
-    radii: tuple[float, ...],
-    top: int,
-    width: float,
-    seed: int,
-    *,
-    periodic: bool = True,
-    draw: int = 0,
+    disks: int, radii: tuple[float, ...], top: int, width: float, seed: int, *, periodic: bool = True, draw: int = 0
 ) -> Disks:
     """Disks above the floor that overlap nowhere, the same on every platform for one seed.
 
@@ -79,20 +66,11 @@ def random_start(
     -------
     Disks
         Positions, radii, the upper layer and the period; the floor is y = 0.
-
-    Raises
-    ------
-    ValueError
-        If the upper layer has more disks than there are, or a disk is wider than the box.
     """
-    if not 0 <= top <= disks or disks < 1:
-        raise ValueError(f"an upper layer of {top} disks cannot be made from {disks}")
     sizes = np.resize(np.sort(radii), disks)
     diameter = 2 * sizes.max()
-    if diameter > width:
-        raise ValueError(f"a disk of radius {sizes.max()} is wider than the box of width {width}")
-
-    generator = _generator(seed, draw)
+    draws = np.random.SeedSequence(seed, spawn_key=(draw,) if draw else ())  # each draw has numbers of its own
+    generator = np.random.Generator(np.random.PCG64(draws))
     bulk = generator.permutation(sizes[top:])
     columns = max(1, int(width / (CELL * diameter)))
     side = np.array([width / columns, CELL * diameter])

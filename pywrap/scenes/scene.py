@@ -45,7 +45,8 @@ from pydantic_core import PydanticCustomError
 from ...analysis import MindlinLaw
 from .command_sections import command_of, study_model, study_models
 from .packing_section import GeneratedPacking, PackingSection
-from .sections import Damping, Drive, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax, refuse_first
+from .run_sections import Drive, Inertia, Perturb, refuse_first
+from .sections import Damping, Friction, Law, Load, Output, Ramp, Relax
 from .units import Units, in_units, real_units
 from .validation import (
     SceneError,

@@ -49,7 +49,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
 
-from ...analysis import MindlinLaw, PackingFileError
+from ...analysis import MindlinLaw
 from .packing_section import GeneratedPacking, PackingSection, StoredPacking
 from .validation import HERTZ_EXPONENT, Section, is_number, refusal_sentence, rounded, to_si
 
@@ -59,13 +59,7 @@ MISMATCH = 0.01
 STIFFNESS_OF_ONE = 2e5
 """k_n where the smallest disks have diameter and mass one: the paper's."""
 
-SI = {
-    "grain_diameter": "m",
-    "density": "kg/m^3",
-    "youngs_modulus": "Pa",
-    "overburden": "Pa",
-    "impact_velocity": "m/s",
-}
+SI = {"grain_diameter": "m", "density": "kg/m^3", "youngs_modulus": "Pa", "overburden": "Pa", "impact_velocity": "m/s"}
 
 
 class Units(Section):
@@ -108,9 +102,7 @@ class Units(Section):
     def _complete(self) -> Units:
         if (self.restitution is None) != (self.impact_velocity is None):
             key = "impact_velocity" if self.impact_velocity is None else "restitution"
-            raise refusal_sentence(
-                key, "is missing: the restitution of such contacts depends on the velocity, so give both"
-            )
+            raise refusal_sentence(key, "is missing: the restitution depends on the velocity, so give both")
         return self
 
     @property
@@ -182,21 +174,13 @@ class RealUnits:
 
     def onset(self, fx: float, omega: float) -> dict[str, float]:
         """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of the growing motion."""
-        return {
-            "shear_stress_Pa": self.stress(fx),
-            "stress_ratio": fx / self.fy,
-            "frequency_Hz": self.frequency(omega),
-        }
+        stress, hertz = self.stress(fx), self.frequency(omega)
+        return {"shear_stress_Pa": stress, "stress_ratio": fx / self.fy, "frequency_Hz": hertz}
 
     def as_dict(self) -> dict[str, float]:
         """For JSON: one unit of the scene in SI, and the overburden."""
-        return {
-            "length_m": self.length,
-            "mass_kg": self.mass,
-            "time_s": self.time,
-            "force_N": self.force,
-            "overburden_Pa": self.overburden,
-        }
+        own = {"length_m": self.length, "mass_kg": self.mass, "time_s": self.time}
+        return own | {"force_N": self.force, "overburden_Pa": self.overburden}
 
 
 class Layer(NamedTuple):
@@ -258,11 +242,8 @@ def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, 
     if isinstance(section, GeneratedPacking):
         smallest = 2 * min(section.radii) * context["units"].length
         if abs(smallest / units.si("grain_diameter") - 1) > 1e-9:
-            raise refusal_sentence(
-                "packing.radii",
-                f"has smallest disks of {smallest:.6g} m, and units.grain_diameter = "
-                f'"{units.grain_diameter}" is their diameter: make them agree',
-            )
+            of_units = f'units.grain_diameter = "{units.grain_diameter}" is their diameter: make them agree'
+            raise refusal_sentence("packing.radii", f"has smallest disks of {smallest:.6g} m, and {of_units}")
         if isinstance(packing.get("mass"), str):
             _agree("packing.mass", packing["mass"], "kg", units.grain_mass, "the mass of a smallest grain")
             packing["mass"], section = 1.0, section.model_copy(update={"mass": 1.0})
@@ -301,12 +282,9 @@ def real_units(scene: Any) -> RealUnits | None:
     real = units_of(units, layer_of(scene.packing), scene.law.kn, scene.load.fy)
     wanted = real.overburden if units.overburden is None else units.si("overburden")
     if abs(real.overburden / wanted - 1) > MISMATCH:
-        raise refusal_sentence(
-            "units.overburden",
-            f"= {units.overburden} is not the load of the scene, which presses with {real.overburden:.4g} Pa: leave "
-            f"load.fy out, or set load.fy = {scene.load.fy * wanted / real.overburden:.6g}, or leave units.overburden "
-            "out",
-        )
+        way = f"leave load.fy out, or set load.fy = {scene.load.fy * wanted / real.overburden:.6g}"
+        says = f"= {units.overburden} is not the load of the scene, which presses with {real.overburden:.4g} Pa: {way}"
+        raise refusal_sentence("units.overburden", says)
     return real
 
 
@@ -339,11 +317,7 @@ def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
         width = section.width if section.periodic else None
         layer = Layer(2 * min(section.radii), section.mass or 1.0, width or 0.0, section.top)
     else:
-        try:
-            packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
-        except PackingFileError as error:
-            says = f'= "{section.file.name}" is refused: {str(error).rstrip(".")}'
-            raise refusal_sentence("packing.file", says) from None
+        packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
         k, width = packing.radius.argmin(), packing.box_length
         smallest = 2 * float(packing.radius[k]), float(packing.mass[k])
         layer = Layer(*smallest, width or 0.0, int(packing.top.sum()))

@@ -42,15 +42,17 @@ else:
 def check_number(value: float) -> float:
     """The number; refused if it is neither 0 nor of a size with which one can compute."""
     if value != 0 and not SMALLEST <= abs(value) <= LARGEST:
-        raise refusal_sentence(
-            "", f"= {reprlib.repr(value)} is refused: give a number between {SMALLEST:g} and {LARGEST:g}"
-        )
+        between = f"give a number between {SMALLEST:g} and {LARGEST:g}"
+        raise refusal_sentence("", f"= {reprlib.repr(value)} is refused: {between}")
     return value
 
 
 Number: TypeAlias = Annotated[float, Field(allow_inf_nan=False), AfterValidator(check_number)]
 Positive: TypeAlias = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(check_number)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(check_number)]
+
+LIST = Field(min_length=1, strict=False)
+"""Of a key that is a list in TOML."""
 
 HERTZ_EXPONENT = 1.5
 """Exponent of Hertz's contact."""
@@ -237,11 +239,8 @@ def unknown_key(path: list[str], sections: Mapping[str, tuple[type[Section], ...
 def is_number(value: object) -> TypeGuard[float]:
     """Whether a value of a scene is a number with which one can compute."""
     # A comparison, because math.isfinite overflows on whole numbers, which TOML may hold of any size.
-    return (
-        isinstance(value, (int, float))
-        and not isinstance(value, bool)
-        and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
-    )
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and (value == 0 or SMALLEST <= abs(value) <= LARGEST)  # type: ignore[arg-type]
 
 
 def require_section(section: T | None, name: str) -> T:

@@ -97,11 +97,11 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         steps ran out.
     """
     if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
-        finest = finest_tolerance(loose)
         if bed:
-            engine.settle(finest)
+            engine.settle(finest_tolerance(loose))
         else:
-            engine.damp(loose, finest, STAGE_STEPS, LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose))))
+            viscosity = LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose)))
+            engine.settle(finest_tolerance(loose), loose, viscosity=viscosity, steps=STAGE_STEPS)
         packing = engine.packing
         try:
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
@@ -117,10 +117,8 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
     stiffness = float(loose.law.normal_stiffness(loose.law.overlap_of_force(carried)))
     viscosity = float(np.pi * SHEAR_SPEED * diameter * np.sqrt(loose.mass.mean() * stiffness) / height)
     report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
-    if bed:
-        engine.settle(TOLERANCES[0] * loose.fy, height / loose.position[:, 1].max(), viscosity, STAGE_STEPS)
-    else:
-        engine.damp(loose, TOLERANCES[0] * loose.fy, STAGE_STEPS, viscosity)
+    start, gather = (None, height / loose.position[:, 1].max()) if bed else (loose, 1.0)
+    engine.settle(TOLERANCES[0] * loose.fy, start, gather, viscosity, STAGE_STEPS)
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
@@ -130,7 +128,7 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         if found:
             return packing
         report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
-        engine.damp(packing, finer * loose.fy, STAGE_STEPS)
+        engine.settle(finer * loose.fy, packing, steps=STAGE_STEPS)
     return minimize_energy(engine.packing)[0]
 
 

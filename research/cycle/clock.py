@@ -21,7 +21,7 @@ from typing import Any
 from faultgouge.analysis import Slip
 from faultgouge.pywrap import DriveStep, Scene
 from faultgouge.pywrap.runs.drive import COMPARABLE, advance_of
-from faultgouge.pywrap.scenes.sections import PROBE_SCALE
+from faultgouge.pywrap.scenes.run_sections import PROBE_SCALE
 from research.cycle.compute import UNTIL, scene
 from research.driven_runs import DrivenRun
 

@@ -1,6 +1,4 @@
-"""The functions of the package that most users need, beside those of its rooms: packings of files of any kind, pictures
-and pages of them, and the pair of eigenvalues that merges at the onset of a scene.
-"""
+"""What `import faultgouge` offers beside its rooms: packings of files of any kind, pictures and pages of them."""
 
 from __future__ import annotations
 
@@ -70,14 +68,11 @@ def load(
 
     Raises
     ------
-    BadInputError
-        If the file does not say law, load or upper layer, and they are not given.
-    PackingFileError
-        If the file is missing, damaged, or of no known format.
+    BadInputError, PackingFileError
+        If the file does not say law, load or upper layer; if it is missing, damaged, or of no known format.
 
     Examples
     --------
-
     >>> from faultgouge.analysis import MindlinLaw
     >>> faultgouge.load("disks.csv", law=MindlinLaw(kn=2e5, kt=6e4, mu=0.5), fy=1.0, top=6, width=6.0)
     <Packing: 18 disks, 22 contacts, 6 in the upper layer, period 6, mu = 0.5, fx = 0, fy = 1>
@@ -104,10 +99,8 @@ def load(
         law = law_of_parameters(given)
     missing = [name for name, known in (("law", law is not None), ("fy", "fy" in given)) if not known]
     if law is None or missing:
-        raise BadInputError(
-            f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
-            "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
-        )
+        way = f"load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, top=10)"
+        raise BadInputError(f"{path} does not say {' and '.join(missing)}: {way} takes the disks as they stand.")
     disks = disks if width is None else replace(disks, box_length=width)
     if top == 0:
         layer = np.zeros(len(disks), dtype=np.bool_)
@@ -156,9 +149,6 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
         chosen = range(self._count)[number]
         return [load(self.path, each) for each in chosen] if isinstance(number, slice) else load(self.path, chosen)
 
-    def __repr__(self) -> str:
-        return f"<frames of {self.path}: {self._count}>"
-
 
 def path_of(file: object, caller: str) -> Path:
     """The path that a function is given; a BadInputError if it is none."""
@@ -183,10 +173,8 @@ def takes_file(
             packing = load(packing)
         elif not hasattr(packing, "configuration"):
             advice = ": give its .packing" if hasattr(packing, "packing") else ""
-            raise BadInputError(
-                f"{name} takes a Packing, a Configuration, or the path of a stored one, and no "
-                f"{type(packing).__name__}{advice}."
-            )
+            takes = f"{name} takes a Packing, a Configuration, or the path of a stored one"
+            raise BadInputError(f"{takes}, and no {type(packing).__name__}{advice}.")
         return function(packing, *args, **options)
 
     return opens
@@ -215,7 +203,6 @@ def stability(
 
     Examples
     --------
-
     >>> *_, last = faultgouge.ramp("three_disks.toml")
     >>> found = faultgouge.stability(last.packing)
     >>> found.stable, round(found.growth_rate, 3), found.at_bound
@@ -281,7 +268,6 @@ def draw(
 
     Examples
     --------
-
     >>> start = faultgouge.settle("three_disks.toml").packing
     >>> faultgouge.draw(start).savefig("packing.png")
     >>> print(faultgouge.draw(start, mode=0).axes[0].get_title())
@@ -320,7 +306,6 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
 
     Examples
     --------
-
     >>> curve = faultgouge.pair("three_disks.toml")
     >>> curve.eigenvalues[0].round(3)
     array([1188.882+0.j, 1484.786+0.j])
@@ -372,14 +357,11 @@ def view(
 
     Raises
     ------
-    BadInputError
-        If the page is no .html.
-    PackingFileError
-        If the file is missing or damaged.
+    BadInputError, PackingFileError
+        If the page is no .html; if the file is missing or damaged.
 
     Examples
     --------
-
     >>> page = faultgouge.view("run.h5", "page.html", say=lambda line: None)
     >>> page.read_text()[:15]
     '<!doctype html>'

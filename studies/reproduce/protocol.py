@@ -22,8 +22,7 @@ from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from ...analysis.files.atomic_write import check_own, make_folder, write_json, write_text
 from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
-from ...analysis.responses.growth import growing_range
-from ...analysis.responses.growth_of_run import PLATEAU_SHARE
+from ...analysis.responses.growth import PLATEAU_SHARE, growing_range
 from ...analysis.responses.response import Response, layer_force, linear_response
 from ...figures import PairCurve
 from ...figures.packing import draw_packing
@@ -33,7 +32,7 @@ from ...figures.series import draw_growth
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, load_at_onset, onset_run
 from ...pywrap.runs.undamped import ACCURATE_SHARE, perturb, time_step
-from ...pywrap.scenes.sections import Perturb
+from ...pywrap.scenes.run_sections import Perturb
 from ...pywrap.scenes.units import dashpot, real_units
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed

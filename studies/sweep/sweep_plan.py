@@ -137,7 +137,7 @@ class Sweep:
         count = prod(map(len, values.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
-        code = user_function(locate(task, folder)).code if own else ""
+        code = user_function(locate(str(task), folder)).code if own else ""
         sweep = cls(str(task), values, dict(scene), code, folder)
         # what is wrong with every scene is refused before any work is done
         if all(point.says is not None for point in sweep.points):

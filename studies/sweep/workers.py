@@ -38,7 +38,7 @@ from scipy.sparse.linalg import ArpackError
 from threadpoolctl import threadpool_limits
 
 from ... import registered
-from ...analysis import FaultgougeError, NoEquilibriumError, Packing
+from ...analysis import FaultgougeError, NoEquilibriumError, OnsetError, Packing
 from ...analysis.windows.slices import cores
 from ...parent_death import end_with
 from ...pywrap import Equilibrium, Scene, SceneError, settle
@@ -50,9 +50,9 @@ from .user_function import UserFunctionError, user_function
 TRIES = 3
 """How often a point is tried again whose worker was killed."""
 
-FINAL_ERRORS = (NoEquilibriumError, SceneError)
-"""Errors that the same scene has again, to the bit: it has no equilibrium, or it is refused. Others may have passed, as
-a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
+FINAL_ERRORS = (NoEquilibriumError, OnsetError, SceneError)
+"""Errors that the same scene has again, to the bit: it has no equilibrium or no onset, or it is refused. Others may
+have passed, as a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
 
 FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryError)
 """Errors of a single scene: those of the package, of LAPACK, of ARPACK, and of a packing that is too large."""

@@ -4,6 +4,7 @@ Of logs, the lines with times that the run took differ from run to run, and are 
 """
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -105,9 +106,9 @@ def folders(tmp_path_factory, lmp_of_the_environment):
                 subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False, timeout=60)
         here[name] = folder
     decks = [str(folder / "deck.in") for folder in here.values()]
-    done = subprocess.run(
-        [sys.executable, "-c", RUN_THEM, *decks], capture_output=True, text=True, check=True, timeout=300
-    )
+    fresh = {key: value for key, value in os.environ.items() if key != "LAMMPS_PLUGIN_PATH"}  # as in a user's shell
+    command = [sys.executable, "-c", RUN_THEM, *decks]
+    done = subprocess.run(command, env=fresh, capture_output=True, text=True, check=True, timeout=300)
     found = dict(json.loads(line) for line in done.stdout.splitlines() if line.startswith('["'))
     return {name: (folder.parent / "lmp", folder, found.get(str(folder / "deck.in"))) for name, folder in here.items()}
 

@@ -112,7 +112,7 @@ def simulates(folder):
         ("onset scene.toml -o onset.json", "nothing was written: give the same command again"),
         (
             "reproduce scene.toml -o out",
-            "what is in out so far is kept; the same command starts from the beginning and replaces it",
+            "out has the parts that were finished; the same command starts from the beginning and replaces",
         ),
         (
             "stability --quick -o out",
@@ -267,9 +267,10 @@ GUARDED = "import os, sys; from faultgouge.signal_guard import guarded; guarded(
         (GUARDED.format("os.abort()"), 1, "a library has ended the command (SIGABRT)"),
         (GUARDED.format("os.kill(os.getpid(), 11)"), 1, "a library has ended the command (SIGSEGV)"),
         (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, possibly for lack of memory"),
+        (GUARDED.format("os._exit(0)"), 1, "a library has ended the command; please report it"),
         (GUARDED.format("sys.exit(3)"), 3, ""),
     ],
-    ids=["interrupt while a class is made", "abort", "segmentation fault", "kill", "exit"],
+    ids=["interrupt while a class is made", "abort", "segmentation fault", "kill", "exit of a library", "exit"],
 )
 def test_how_the_work_has_ended_is_said_in_one_sentence(tmp_path, script, code, says):
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60)

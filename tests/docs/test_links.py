@@ -152,15 +152,16 @@ def test_the_readme_runs_in_an_empty_folder(tmp_path, faultgouge_here, monkeypat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(path.name for path in (ROOT / "scenes" / "examples").iterdir()))
+@pytest.mark.parametrize("name", sorted({path.name for path in (ROOT / "scenes" / "examples").iterdir()} - {"pour.in"}))
 def test_examples_run(tmp_path, faultgouge_here, monkeypatch, name):
-    """Each example of the shelf, by the command that it names."""
+    """Each example of the shelf, by the command that it names; that of the README runs there."""
     monkeypatch.chdir(tmp_path)
     *_, said = faultgouge_here("examples", name).stdout.splitlines()
     assert (tmp_path / name).exists()
     for command in said.removeprefix("next: ").split(" && "):
         words = command.split()
         if words[0] == "faultgouge":
+            words += ["--workers", "1"] if words[1] == "sweep" else []
             faultgouge_here(*words[1:])
         else:
             done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, timeout=100)

@@ -21,7 +21,6 @@ from faultgouge.pywrap.runs.drive import (
     check_drive,
     clock_advance,
     settle_for_drive,
-    slips_in,
 )
 
 BASE = {
@@ -172,23 +171,6 @@ def test_run_does_not_depend_on_where_it_ends(scene, tmp_path, spring):
         np.testing.assert_array_equal(times, other.observable("time")[: len(times)])
 
 
-def test_states_are_packings_under_the_force_of_the_spring(scene, tmp_path):
-    """Slow driving: the force balances the contacts, but for vibrations, and the layer follows as it yields."""
-    run_to_end(scene(spring=10.0, velocity=2e-3, until=40.0, states=10.0), tmp_path / "drive.h5")
-    with RunFile(tmp_path / "drive.h5") as file:
-        times, series = file.observable("time"), file.series("drive")
-        for k in range(len(file)):
-            packing, row = file.packing(k), np.searchsorted(series["time"], times[k])
-            # what accelerates the layer; single disks shake more
-            assert abs(packing.net_force[: len(packing)][packing.top].mean()) < 0.02 * packing.fy
-            if k > 0:
-                assert packing.fx == series["force"][row]
-                assert series["at_bound"][row] == packing.sliding.sum()
-                assert series["thickness"][row] == packing.position[packing.top, 1].mean()
-        np.testing.assert_allclose(series["force"], 10.0 * (2e-3 * series["time"] - series["displacement"]), atol=1e-12)
-        assert 0.6 < packing.fx < 0.8
-
-
 SLIPS = {
     "packing": {"disks": 30, "seed": 4},
     "law": {"kn": 2e5},
@@ -215,20 +197,16 @@ def test_states_are_the_even_ones_and_both_ends_of_each_slip_wherever_the_run_is
     even = {rows[count - 1].time for count, _ in kept}
     assert len(slips) == 2
     assert [time for time, _ in states] == sorted(even | ends | {rows[-1].time})
+    samples = {row.time: row for row in rows}
+    for packing, row in ((state.packing, samples[state.time]) for step in steps for state in step.states):
+        # a packing under the force of the spring, 10 of a displacement; what accelerates the layer is small
+        assert packing.fx == row.force == pytest.approx(10.0 * (2e-3 * row.time - row.displacement), abs=1e-12)
+        assert row.at_bound == packing.sliding.sum()
+        assert row.thickness == packing.position[packing.top, 1].mean()
     for slip in slips:  # cut off within a slip, which has pending states
         count, reached = next(each for each in kept if rows[each[0] - 1].time > slip.begins)
         assert reached.pending
         assert run(rows[:count], reached)[1] == [each for each in states if each[0] >= reached.pending[0].time]
-
-
-def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
-    wanted = scene(spring="rigid", protocol=[[1e-2, 1.0], [0.0, 0.5]])
-    run_to_end(wanted, tmp_path / "drive.h5")
-    with RunFile(tmp_path / "drive.h5") as file:
-        series, slips = file.series("drive"), slips_in(file)
-    assert series["displacement"][-1] == pytest.approx(1e-2, rel=1e-3)  # a step more or less
-    assert series["force"].max() > 0.3
-    assert slips == []
 
 
 PULSE = {"signal": "pulse", "omega": 1.0}
@@ -359,15 +337,7 @@ def test_error_of_a_clock_advance_is_that_of_one_more_draw():
     assert advance_error([0.0, None, 0.0], 0.1) is None
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"spring": "rigid", "velocity": 300.0},
-        {"spring": 10.0, "velocity": 1e-3, "signal": "pulse", "at": 0.1, "omega": 100.0, "scale": 1e6},
-    ],
-)
-def test_disks_that_move_through_one_another_end_the_run_with_what_to_change(scene, settings):
-    wanted = scene(**settings, until=1.0)
-    start = settle_for_drive(wanted)
+def test_disks_that_move_through_one_another_end_the_run_with_what_to_change(scene):
+    wanted = scene(spring="rigid", velocity=300.0, until=1.0)
     with pytest.raises(EngineError, match=r"ended before t = 0\.\d+: take a slower drive, .* as LAMMPS stopped: "):
-        list(drive(wanted, start))
+        list(drive(wanted, settle_for_drive(wanted)))

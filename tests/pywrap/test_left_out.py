@@ -37,23 +37,6 @@ def test_a_run_holds_what_it_needs_and_nothing_else(reference_packing, tmp_path,
         assert set(everything(contents(engine, log))) == holds
 
 
-@pytest.mark.parametrize(
-    ("mu", "work", "parts", "fixes"),
-    [
-        (0.0, lambda engine: engine.settle(1e-8), {"bed.in", "damp.in"}, {"floor", "load"}),
-        (1.0, lambda engine: engine.relax(1e-3), {"friction.in", "relax.in"}, {"angle", "floor", "load", "slips"}),
-    ],
-    ids=["settling", "relaxing"],
-)
-def test_what_dynamics_need_is_taken_away_again(reference_packing, tmp_path, mu, work, parts, fixes):
-    log = tmp_path / "log"
-    with Engine(reference_packing(mu), log=log) as engine:
-        work(engine)
-        here = contents(engine, log)
-    assert set(here["parts"]) == {"system.in", "balance.in"} | parts
-    assert (set(here["fixes"]), here["computes"]) == (fixes, ())
-
-
 def same_motion(one, other):
     """Whether positions and velocities are the same to the bit."""
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)

@@ -128,7 +128,6 @@ def test_what_cannot_be_run_is_refused_in_one_sentence(refused_scene, changes, s
         ("deep.json", b"[" * 100_000, ""),
         ("long.json", b'{"x": [' + b"9" * 400 + b'], "y": [1.0], "radius": [0.5]}', ""),
     ],
-    ids=["missing", "broken", "other", "no HDF5", "nested too deeply", "a number that is too long"],
 )
 def test_a_packing_file_is_looked_at_before_any_work(refused_scene, tmp_path, name, content, says):
     if content is not None:

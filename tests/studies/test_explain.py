@@ -10,7 +10,7 @@ from reference_layer import SMALL
 
 from benchmarks.parts import features as pairs_of
 from benchmarks.parts import set_up
-from faultgouge.assessment.explain import affordable, contents, everything, explain, features, in_words, run_of
+from faultgouge.assessment.explain import affordable, contents, everything, explain, features, in_words
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -25,12 +25,13 @@ def kinds(held):
 def test_what_is_in_and_what_is_out():
     smooth = Scene.from_toml(SCENES / "frictionless.toml").resolved() | {"output": {"dumps": True, "trajectory": True}}
     pulse = {"fx": 0.0, "time": 1.0, "signal": "pulse", "amplitude": 1e-9, "omega": 3.0}
-    paper = explain(Scene.from_toml(SCENES / "paper.toml"))
+    paper, drawn = (explain(Scene.from_toml(SCENES / f"{name}.toml")) for name in ("paper", "drive"))
     frictionless = explain(Scene.from_mapping(smooth | {"perturb": pulse}))
-    inside = [{part["name"] for part in each["parts"] if part["included"]} for each in (paper, frictionless)]
+    inside = [{part["name"] for part in each["parts"] if part["included"]} for each in (paper, frictionless, drawn)]
     always = {"floor", "periodicity"}
     assert inside[0] == always | {"tangential history", "dynamic friction", "perturbation"}
     assert inside[1] == always | {"signal", "dumps", "trajectory"}
+    assert inside[2] == always | {"tangential history", "dashpots", "spring"}
     assert {part["name"] for part in paper["parts"]} >= NOT_OF_A_RUN
     for part in frictionless["parts"]:
         if part["name"] in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
@@ -78,14 +79,3 @@ def test_each_feature_brings_what_is_said_and_leaves_the_rest_to_the_bit(tmp_pat
         assert same.all() or name not in ("tangential history", "dashpots", "drag", *quiet), name
         assert same.mean() > 0.5 or name == "compensated coordinates", name
     assert seen == set(brings)
-
-
-def test_a_driven_scene_has_its_spring(tmp_path):
-    scene = Scene.from_toml(SCENES / "drive.toml")
-    packing = settle(scene, communicator=MPI.COMM_SELF).packing
-    with set_up(packing, tmp_path / "log", **run_of(scene, packing)) as (engine, dynamics):
-        still = dynamics.advance(1).position
-        why, *brings = features(packing, run_of(scene, packing))["spring"]
-        assert kinds(contents(engine, tmp_path / "log")).issuperset(brings)
-    np.testing.assert_allclose(still, packing.position, atol=1e-9)  # in small steps, from rest
-    assert (why, features(packing, {})["spring"][0]) == ("stiffness 10.0", "no section [drive]")

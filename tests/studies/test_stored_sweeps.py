@@ -41,18 +41,12 @@ def ends(scene):
 def contacts(scene, settled):
     return {"contacts": np.int64(len(settled.packing.contacts)), "of": {"x": settled.packing.position[:2, 0]}}
 
-def seed_of(scene):
-    return scene.packing.seed
-
 def imports(scene):
     from tools.numbers import number
-    return {"number": number}
 
-def nothing(scene):
-    return {"number": float("nan")}
-
-def fails(scene):
-    return {"number": 1 / 0}
+def seed_of(scene): return scene.packing.seed
+def nothing(scene): return {"number": float("nan")}
+def fails(scene): return {"number": 1 / 0}
 """
 
 
@@ -146,7 +140,7 @@ def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
 
 
 def test_rows_of_a_function_hold_its_numbers_or_say_why_not(folder):
-    first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id, workers=2)
+    first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id)
     rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
     assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
     for function, says in (

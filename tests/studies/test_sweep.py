@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference_layer import BIN, SMALL, on_ranks, toml
+from table_rows import rows_of
 
 from faultgouge.pywrap import SceneError, settle
 from faultgouge.pywrap.onset import onset_run
@@ -67,33 +68,13 @@ def test_what_settles_alike(axes, packing, shared):
     assert (first.settling_key == second.settling_key) is shared
 
 
-BAD_SWEEPS = [
-    ('task = "onest"', "give one of"),
-    ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
-    ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "give a list of values"),
-    ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
-    ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
-    ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
-    ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
-    ('task = "onset"\nsweep = 3', "is not a section"),
-    ("task = ", "not valid TOML"),
-    ('task = "none.py:contacts"', "cannot be imported .FileNotFoundError"),
-    ('task = "ask.py:nothing"', "has no function nothing"),
-    ('task = "ask.py:three"', r"takes 3 arguments: a task is three\(scene\)"),
-    ('task = "no.such.module:f"', "cannot be imported"),
-    ('task = "broken.py:f"', "cannot be imported .SyntaxError"),
-    ('task = "ends.py:f"', r"cannot be imported .SystemExit: 0"),
-]
-
-
-@pytest.mark.parametrize(("text", "says"), BAD_SWEEPS)
-def test_a_bad_sweep_is_refused_in_a_sentence(tmp_path, text, says):
+@pytest.mark.parametrize(("mapping", "says"), rows_of("studies/refused_sweeps.txt"))
+def test_a_bad_sweep_is_refused_in_a_sentence(tmp_path, mapping, says):
     codes = {"ask": "def three(scene, settled, more): ...", "broken": "def", "ends": "raise SystemExit(0)"}
     for name, code in codes.items():
         (tmp_path / f"{name}.py").write_text(code)
-    (tmp_path / "sweep.toml").write_text(text)
-    with pytest.raises(SceneError, match=says):
-        Sweep.from_toml(tmp_path / "sweep.toml")
+    with pytest.raises(SceneError, match=re.escape(says)):
+        Sweep.from_mapping(mapping, tmp_path)
 
 
 @pytest.mark.slow

@@ -12,12 +12,7 @@ TIME = np.linspace(0.1, LENGTH, 4000)
 def run_of(msd, crossing):
     """A run whose layer is fast enough from a time on, or never."""
     fast = (np.inf if crossing is None else crossing) <= TIME
-    return {
-        "time": TIME,
-        "msd": msd,
-        "layer_velocity": np.where(fast, 2 * V0, 0.5 * V0),
-        "friction": np.where(fast, 0.48, 0.6),
-    }
+    return {"time": TIME, "msd": msd, "layer_velocity": np.where(fast, 2 * V0, 0.5 * V0)}
 
 
 def noise(exponent=2.0):

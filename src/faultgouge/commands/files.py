@@ -32,23 +32,11 @@ if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.analysis.files.formats import Disks
 
-OF_SOURCE = (
-    "A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or LAMMPS "
-    "data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file that "
-    "MDAnalysis reads with radii."
-)
-OF_LAYER = (
-    "The upper layer: a number of highest disks that touch something, type:2 or type:NAME, ids:1,4,7-9, ids:@FILE, "
-    "group:NAME of a restart, or a region such as 'y>10 and x<5'. By default the upper layer of the file."
-)
-OF_CONTACTS = (
-    "A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with --material "
-    "forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS, or measured ones (RigidLibrary)."
-)
+OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON; of YADE and MercuryDPM."
+OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
+OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
 OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
-OF_BALANCE = (
-    "For a deck: force on a particle that may be out of balance, as a share of the mean contact force; 1e-4 by default."
-)
+OF_BALANCE = "Of a deck: force that may be out of balance, as a share of the mean contact force; 1e-4 by default."
 OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
 OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
 
@@ -64,16 +52,12 @@ def import_(
     fy: Annotated[float | None, Option(help="Load on each disk of the layer.")] = None,
     fx: Annotated[float | None, Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
     floor: Annotated[float | None, Option(help=OF_FLOOR)] = None,
-    width: Annotated[
-        str | None, Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
-    ] = None,
+    width: Annotated[str | None, Option(metavar="L|open", help="Period along x; that of the file by default.")] = None,
     contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
     frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
     material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
-    columns: Annotated[
-        str | None, Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
-    ] = None,
+    columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
     """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
@@ -106,9 +90,7 @@ def import_(
             raise typer.BadParameter("--balance is for a LAMMPS deck (.in): leave it out")
         yield from _disks(file, output, relax, given)
     elif given:
-        raise typer.BadParameter(
-            f"{file} is a deck, which says all by itself: leave all options but -o, --relax and --balance"
-        )
+        raise typer.BadParameter(f"{file} is a deck: only -o, --relax and --balance go with it")
     else:
         yield from _deck(file, output, relax, balance)
 
@@ -144,6 +126,7 @@ def _spheres(
     from faultgouge.analysis.files.configuration_file import write_configuration
     from faultgouge.analysis.files.contact_tables import (
         material_of,
+        of_material,
         read_contacts,
         read_spheres,
         verdict_within_digits,
@@ -152,34 +135,30 @@ def _spheres(
 
     if not is_root():
         return
-    law = material_of(material)
-    if contacts is not None and is_measured(contacts):
-        with working("draws of the forces"):
-            found, counts = measured_forces(file, contacts, law, frame)
-        write_configuration(output, found, {"deck": ""})
-        yield "\n".join([f"written to {output}", *counts])
-        return
-    spheres = read_spheres(file, frame)
+    law, says = material_of(material), list[str]()
     if contacts is None:
-        found = spheres.of_material(law)
+        found = of_material(read_spheres(file, frame), law)
+        says = [*found.remarks]
+    elif is_measured(contacts):
+        with working("draws of the forces"):
+            found, says = measured_forces(file, contacts, law, frame)
     else:
-        found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
+        names = None if columns is None else columns.split(",")
+        found = read_contacts(read_spheres(file, frame), contacts, law, names, frame)
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written")
     yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
-    if contacts is None:
-        yield "\n".join(found.remarks)
-        return
-    with working("stability"):
-        verdict, says = verdict_within_digits(found)
-    yield f"{verdict}\n{says}"
+    if contacts is not None and not says:
+        with working("stability"):
+            verdict, within = verdict_within_digits(found)
+        says = [f"{verdict}", within]
+    yield "\n".join(says)
 
 
 def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Results:
     """Store disks of another code in balance, or brought to rest if that is wanted, and say what they are."""
     from faultgouge.analysis import BadInputError, PackingFileError, RunFile
     from faultgouge.analysis.files.formats import DATA, RESTART, format_of
-    from faultgouge.analysis.files.formats.disks import layer_remark
     from faultgouge.analysis.files.formats.tables import read_slips
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
     from faultgouge.pywrap.lammps.restart_file import read_disks
@@ -202,16 +181,13 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         reads = "read_restart" if format_of(file) is RESTART else "units lj, atom_style sphere and read_data"
         says = f"For spheres, or another law, write a deck with {reads} {file.name}, its laws, its walls and a run,"
         raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
-    for remark in filter(None, (disks.remark, layer_remark(disks, given.get("top"), packing.top))):
-        say(f"{file}: {remark}")
+    if disks.remark:
+        say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
-            raise PackingFileError(
-                f"{file} is not in balance under fy = {packing.fy:g}: {feels}; check law and load, or let it come to "
-                "rest with --relax."
-            )
+            raise PackingFileError(f"{file} is not in balance under fy = {packing.fy:g}: {feels}; --relax mends it.")
         with status("coming to rest") as show:
             resting, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
         yield words
@@ -223,11 +199,9 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
                 run.complete = True
     if not packing.slips_known:
         say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
+    disks_of = f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer"
     contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
-    yield (
-        f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
-        f"{packing.residual:.2g}; written to {output}"
-    )
+    yield f"{disks_of}, {contacts_of}; residual {packing.residual:.2g}; written to {output}"
 
 
 def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
@@ -260,7 +234,7 @@ def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
         wanted = Scene.from_toml(scene, packing={"radii": [smallest], "width": 20 * smallest}, command="settle")
         law, load = law_of(wanted, wanted.law.mus[0]), load_of(wanted)
     else:
-        with telling(disks.source, "describes no possible packing", (ValueError,)):
+        with telling(disks.source, "describes no possible packing", ValueError):
             law = law_of_parameters({"kt": 2 * values["kn"] / 7, "mu": 1.0} | values)
         inertia = values.get("inertia_factor", 1.0)
         load = {"fy": values["fy"], "drag_time": values.get("tau"), "inertia_factor": inertia}
@@ -271,13 +245,9 @@ def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
 def export(
     file: PackingFile,
     frame: Frame = -1,
-    mode: Annotated[
-        str | None, Option("--mode", metavar="pair|N", help="Also a mode as vectors, as in `faultgouge draw`.")
-    ] = None,
+    mode: Annotated[str | None, Option("--mode", metavar="pair|N", help="Also a mode, as of `draw`.")] = None,
     frames: Annotated[str | None, Option("--frames", metavar="all|START:STOP[:STEP]", help=OF_FRAMES)] = None,
-    output: Annotated[Path, Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
-        "packing.vtp"
-    ),
+    output: Annotated[Path, Option("-o", "--output", help=".vtp, .pvd, .xyz, .data, .gsd, .csv")] = Path("packing.vtp"),
 ) -> Results:
     """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 

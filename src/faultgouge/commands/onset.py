@@ -20,13 +20,8 @@ if TYPE_CHECKING:
 @command(f"{LAYER} && faultgouge onset scene.toml --json", reads="onset", writes="file", as_json=True)
 def onset(
     scene: SceneFile,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
-    ] = None,
-    every: Annotated[
-        bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer.")
-    ] = False,
+    output: Annotated[Path | None, Option("-o", "--output", help="Also write the JSON; continues a search.")] = None,
+    every: Annotated[bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks.")] = False,
 ) -> Results:
     """Compute the onset F_x^c for each friction coefficient of the scene. The ramp ends there.
 
@@ -43,10 +38,8 @@ def onset(
     from faultgouge.pywrap.settling.settle import shared_bed
 
     if every and (disks := scene.packing.disks) > LIMITS.all_windows:
-        raise BadInputError(
-            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
-            "out for the first window, or take a smaller packing"
-        )
+        takes = f"--all finds all windows of up to {LIMITS.all_windows} disks"
+        raise BadInputError(f"{takes}, and the packing has {disks}: leave --all out for the first window")
     # a long search leaves what it finds beside its file, unless that is a device
     folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
     with working("settling"):
@@ -56,7 +49,7 @@ def onset(
     for mu in scene.law.mus:
         try:
             each = _search(scene, mu, not every, bed, folder)
-            yield from _in_words(scene, each)
+            yield from _in_words(each)
             found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | _in_si(scene, each))
         except (OnsetError, NoEquilibriumError) as error:
             failed = error
@@ -98,16 +91,11 @@ def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None)
         report_fallback(equilibrium)
     expected = "a motion was expected to grow" if dissipation else "a pair was expected to become complex"
     for below, above in found.doubtful:
-        say(
-            f"{expected} between F_x = {below:.6g} and {above:.6g}, and was not found: an earlier onset may hide "
-            "there; take smaller increments to be sure"
-        )
+        hides = "was not found: an earlier onset may hide there; take smaller increments to be sure"
+        say(f"{expected} between F_x = {below:.6g} and {above:.6g}, and {hides}")
     if alone := [each for each in found.windows if each.path_error is None and each.kind != "start"]:
-        say(
-            f"the error of {len(alone)} of {counted(len(found.windows), 'onset')}, the first at F_x = "
-            f"{alone[0].fx_onset:.6g}, is that of rounding alone: no equilibrium was found there a second time, so "
-            "that the error of the path is not known; other increments may find one"
-        )
+        which = f"{len(alone)} of {counted(len(found.windows), 'onset')}, the first at F_x = {alone[0].fx_onset:.6g}"
+        say(f"the error of {which}, is that of rounding alone: other increments may find that of the path, too")
     return found
 
 
@@ -121,13 +109,11 @@ def _in_si(scene: Scene, found: Onset) -> dict[str, list[dict[str, float]]]:
     return {"si": [real.onset(each.fx_onset, omega[k]) for k, each in enumerate(found.windows)]}
 
 
-def _in_words(scene: Scene, found: Onset) -> Results:
-    """The onset of a friction coefficient: F_x^c, how it begins, all windows as a table; in SI as well."""
+def _in_words(found: Onset) -> Results:
+    """The onset of a friction coefficient: F_x^c, how it begins, and all windows as a table."""
     from faultgouge.analysis.uncertain_digits import with_uncertainty
 
     mu, opening = f"mu = {found.mu:g}", found.windows[0]
-    si = [[f"{number:.4g}" for number in each.values()] for each in _in_si(scene, found).get("si", [])]
-    first_in_si = [f"{mu}: in SI a shear stress of {s} Pa, {r} of the overburden, at {f} Hz" for s, r, f in si[:1]]
     if opening.dissipative:
         omega = f"omega = {opening.frequency:.6g}"
         if opening.kind == "start":
@@ -137,20 +123,17 @@ def _in_words(scene: Scene, found: Onset) -> Results:
             yield f"{mu}: with dissipation {found.describe()} ({opening.kind}, {omega})"
         undamped = "none on this ramp" if found.undamped is None else found.undamped.describe()
         yield f"{mu}: without dissipation {undamped}"
-        yield from first_in_si
         return
     yield f"{mu}: {found.describe()}"
     if found.complete:
-        headings = ["in Pa", "F_x/F_y", "in Hz"] if si else ["eigenvalue"]
-        rows = []
-        for k, each in enumerate(found.windows):
-            until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
-            numbers = si[k] if si else [f"{each.eigenvalue:.6g}"]
-            rows.append([with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind])
-        yield table_of(("from F_x", "to F_x", *headings, "begins with"), rows)
+        ends = ["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]
+        rows = [
+            (with_uncertainty(each.fx_onset, each.error), end, f"{each.eigenvalue:.6g}", each.kind)
+            for each, end in zip(found.windows, ends, strict=True)
+        ]
+        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), rows)
     elif opening.kind != "start":
         how = "two eigenvalues merge" if opening.kind == "coalescence" else "contacts change"
         yield f"{mu}: {how} there, and become complex about {opening.eigenvalue:.6g} ({opening.kind})"
-        yield from first_in_si
     if found.ends is not None and found.complete:
         yield f"{mu}: the branch of equilibria ends before F_x = {found.ends:g}, where an eigenvalue is negative"

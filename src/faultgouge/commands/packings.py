@@ -48,9 +48,7 @@ RULES = {
 }
 """Rules for time steps by their keys in JSON."""
 
-Follow = Annotated[
-    bool, Option("--follow", help="Where motion grows, let LAMMPS go on until it vibrates, creeps or flows.")
-]
+Follow = Annotated[bool, Option("--follow", help="Let LAMMPS go on where motion grows, until it ends.")]
 OF_RISE = "Also the motion while F_x rises slowly: drift and vibration over its rate."
 OF_ANY = "run.h5, NAME.disks, a LAMMPS deck; or, with --material, a table of spheres (CSV, dump, YADE, .data)."
 AnyPacking = Annotated[Path, Argument(metavar="FILE", help=OF_ANY, callback=refuse_scene)]
@@ -61,9 +59,7 @@ OF_TIME = "How long motion is followed; until it has settled by default."
 
 @command("faultgouge examples pour && faultgouge stability pour.in --follow", as_json=True)
 def stability(
-    file: Annotated[
-        Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a LAMMPS deck (.in).")
-    ] = None,
+    file: Annotated[Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a deck (.in).")] = None,
     rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE, callback=one_of("fx"))] = None,
     followed: Annotated[float | None, Option("--time", metavar="T", help=OF_TIME)] = None,
     follow: Follow = False,
@@ -123,15 +119,8 @@ def spectrum(
     file: PackingFile,
     frame: Frame = -1,
     time: Time = None,
-    values: Annotated[
-        bool, Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
-    ] = False,
-    gain: Annotated[
-        bool,
-        Option(
-            "--gain", help="Also how much a stable packing amplifies its worst push; up to 300 disks or 150 spheres."
-        ),
-    ] = False,
+    values: Annotated[bool, Option("--values", help="The eigenvalues alone, in a third of the time.")] = False,
+    gain: Annotated[bool, Option("--gain", help="Also the largest gain of a push; up to 300 disks.")] = False,
     rise: Annotated[bool, Option("--rise", help=OF_RISE)] = False,
     follow: Follow = False,
 ) -> Results:
@@ -267,9 +256,7 @@ def vibrations(
     output: NewFolder = Path("vibrations"),
     material: MaterialOf = None,
     frame: Frame = -1,
-    along: Annotated[
-        str, Option(metavar="x|y|z", help="Edge of the box along which plane waves run.", callback=one_of(*"xyz"))
-    ] = "x",
+    along: Annotated[str, Option(metavar="x|y|z", help="Where plane waves run.", callback=one_of(*"xyz"))] = "x",
     waves: Annotated[int, Option(min=0, help="Plane waves, from the one as long as the box.")] = 4,
 ) -> Results:
     """Compute how a packing vibrates: density of states, modes, softness, plane waves, elastic moduli.
@@ -328,9 +315,9 @@ def vibrations(
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
-    from faultgouge.analysis.files.contact_tables import material_of, read_spheres
+    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_spheres
     from faultgouge.door import load
 
     if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
         raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
-    return load(file, frame) if material is None else read_spheres(file, frame).of_material(material_of(material))
+    return load(file, frame) if material is None else of_material(read_spheres(file, frame), material_of(material))

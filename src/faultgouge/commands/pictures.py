@@ -39,10 +39,8 @@ if TYPE_CHECKING:
     from ..analysis.has_configuration import HasConfiguration
 
 
-OF_MODE = (
-    "The unstable pair, or before the onset the two modes closest to merging; or mode N, counted by eigenvalue from 0."
-)
-OF_FILM = "The film: .mp4 or .gif; of spheres .xyz or .pvd. By default film.mp4, or film.gif without imageio-ffmpeg."
+OF_MODE = "The unstable pair, or the two modes closest to merging; or mode N, by eigenvalue from 0."
+OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
 OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
 OF_COLOUR = "Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none."
@@ -61,9 +59,7 @@ def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], st
 @command(f"{RAMPED} && faultgouge draw run.h5 --mode pair", writes="file", alone=True)
 def draw(
     file: PackingFile,
-    frame: Annotated[
-        int | None, Option(help="Number of the equilibrium, by default the last; negative numbers count from the end.")
-    ] = None,
+    frame: Annotated[int | None, Option(help="Number of the equilibrium; negative: from the last.")] = None,
     time: Time = None,
     mode: WhichMode = None,
     color: WhichColour = "mobilised",
@@ -131,13 +127,8 @@ def movie(
     color: WhichColour = "mobilised",
     seconds: Annotated[float, Option(min=0.1, max=600, help="Length of the film.")] = 10.0,
     rate: Annotated[float, Option(min=1, max=60, help="Frames per second.")] = 10.0,
-    span: Annotated[
-        tuple[float, float] | None,
-        Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
-    ] = None,
-    dots: Annotated[
-        int | None, Option(min=30, max=800, help="Dots per inch: 110 for .gif, 1080 lines for .mp4.")
-    ] = None,
+    span: Annotated[tuple[float, float] | None, Option(metavar="T0 T1", help="Times of the run to show.")] = None,
+    dots: Annotated[int | None, Option(min=30, max=800, help="Dots per inch; 110 for .gif.")] = None,
     output: Annotated[Path | None, Option("-o", "--output", help=OF_FILM)] = None,
 ) -> Results:
     """Make a film of an undamped run, of a mode, or of a ramp.
@@ -147,30 +138,21 @@ def movie(
     and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
     its states, to scale, and the force over time. An .mp4 needs
-    pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
-    (.xyz) or ParaView (.pvd).
+    pip install 'faultgouge[movie]'. Modes of spheres move on the page of `faultgouge view`.
     """
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats import ModeVectors, write_mode_frames
-    from faultgouge.figures.film import DOTS, check_name, film_of_modes, usual_suffix, write_film
+    from faultgouge.figures.film import DOTS, check_name, usual_suffix, write_film
+    from faultgouge.figures.motion_films import film_of_modes
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
     count, periods = max(2, round(seconds * rate)), max(1, round(seconds / 2))
     packing = None if mode is None else stored_packing(file, frame)
-    if packing is not None and packing.configuration.dimension == 3:
-        if output.suffix not in (".xyz", ".pvd"):
-            raise BadInputError(
-                f"-o {output}: a mode of spheres moves in OVITO (.xyz) or ParaView (.pvd); give one of these."
-            )
-        with locked(output, file):
-            (first, *others), _ = modes_of(packing, str(mode))
-            if others:
-                raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
-            vectors = ModeVectors(f"mode_{first.number}", first.eigenvalue, first.displacement)
-            write_mode_frames(output, packing.configuration, vectors, count, periods)
-        yield f"{counted(count, 'frame')} of {first.plain}; written to {output}"
-        return
+    if packing is not None and packing.dimension == 3:
+        raise BadInputError(
+            f"{file} has spheres, and a film shows disks: `faultgouge view` shows their modes in motion, and "
+            "`faultgouge export --mode` has the vectors for ParaView (.vtp) and OVITO (.xyz)."
+        )
     check_name(output)
     with locked(output, file):
         if packing is None:
@@ -185,7 +167,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
-    from faultgouge.figures.film import Course, RunMotion, film_of_ramp, film_of_run
+    from faultgouge.figures.motion_films import Course, RunMotion, film_of_ramp, film_of_run
     from faultgouge.pywrap.runs.drive import series_and_slips
 
     if file.suffix == ".disks" or holds_configuration(file):
@@ -199,17 +181,12 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             times = run.observable("time").tolist()
             shown = [k for k in shown if first <= times[k] <= last]
             if len(shown) < 2:
-                raise PackingFileError(
-                    f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}, and a "
-                    "film shows two or more: give a longer --span"
-                )
+                says = f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}"
+                raise PackingFileError(f"{says}, and a film shows two or more: give a longer --span")
             course = Course.of_drive(*driven, [times[k] for k in shown], first, last)
         packings = [run.packing(k) for k in shown]
     if len(packings) < 2:
-        raise PackingFileError(
-            f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
-            "with trajectory = true under [output]"
-        )
+        raise PackingFileError(f"{file} has one equilibrium and no trajectory: ask for a mode with --mode")
     return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven is not None)
 
 

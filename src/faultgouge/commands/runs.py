@@ -18,7 +18,7 @@ from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, RunFile
-    from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
+    from faultgouge.analysis.responses.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
 
 SLIP_COLUMNS = [
@@ -88,8 +88,6 @@ def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
     """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
     from faultgouge.pywrap import settle
 
-    if record.remark:
-        say(record.remark)
     if record.last is None:
         with status("settling") as show:
             record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
@@ -170,8 +168,6 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, scene, task="perturb", saved=_keeps) as record:
-        if record.remark:
-            say(record.remark)
         if (start := record.last) is None:
             if (fx := settings.fx) is None:
                 fx = load_at_onset(scene)
@@ -209,7 +205,7 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
 def growth_in(file: RunFile) -> GrowthOfRun | None:
     """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run;
     None of another file, or where the run has not begun."""
-    from faultgouge.analysis.responses.growth_of_run import growth_of_run
+    from faultgouge.analysis.responses.growth import growth_of_run
     from faultgouge.pywrap.runs.undamped import time_step
 
     if file.attributes.get("task") != "perturb" or "undamped" not in file.names_of_series:
@@ -265,8 +261,6 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
     from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
 
     with Record(output, scene, task="drive", saved=_keeps) as record:
-        if record.remark:
-            say(record.remark)
         if record.last is None:
             if start is None:
                 with status("settling") as show:
@@ -297,14 +291,10 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
     with RunFile(output) as file:
         (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
-    rows = [
-        asdict(slip)
-        | {
-            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
-            "frame_after": int(np.searchsorted(times, slip.ends)),
-        }
-        for slip in slips
-    ]
+    before = (np.searchsorted(times, [slip.begins for slip in slips], side="right") - 1).tolist()
+    after = np.searchsorted(times, [slip.ends for slip in slips]).tolist()
+    ends = [{"frame_before": begin, "frame_after": end} for begin, end in zip(before, after, strict=True)]
+    rows = [asdict(slip) | frames for slip, frames in zip(slips, ends, strict=True)]
     write_csv(table, SLIP_COLUMNS, rows)
     friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
     result = {

@@ -36,8 +36,8 @@ from .terminal import (
 if TYPE_CHECKING:
     from faultgouge.studies.sweep.sweep_plan import Sweep
 
-REPLACED = "; the same command starts from the beginning and replaces them"
-TRIED = "{output} has the cases that were finished" + REPLACED
+FINISHED = "{{output}} has the {} that were finished; the same command starts from the beginning and replaces them"
+TRIED = FINISHED.format("cases")
 OF_SHARD = "Only part K of N, for job arrays; each part needs its own folder."
 Shard = Annotated[str, Option(metavar="K/N", help=OF_SHARD)]
 
@@ -95,15 +95,9 @@ def explain(scene: SceneFile) -> Results:
     yield found
 
 
-@command(
-    "faultgouge reproduce -o results",
-    kept="what is in {output} so far is kept; the same command starts from the beginning and replaces it",
-    writes="folder",
-)
+@command("faultgouge reproduce -o results", kept=FINISHED.format("parts"), writes="folder")
 def reproduce(
-    scene: Annotated[
-        Path | None, Argument(metavar="[SCENE]", help="A scene of your own, in place of that of the package.")
-    ] = None,
+    scene: Annotated[Path | None, Argument(metavar="[SCENE]", help="A scene of your own.")] = None,
     output: NewFolder = Path("results"),
 ) -> Results:
     """Run the paper's protocol on one packing: figures, numbers and a report.
@@ -122,11 +116,7 @@ def reproduce(
     yield f"written: {output}/report.md"
 
 
-@command(
-    "faultgouge report --quick -o report",
-    kept="{output} has the studies that were finished" + REPLACED,
-    writes="folder",
-)
+@command("faultgouge report --quick -o report", kept=FINISHED.format("studies"), writes="folder")
 def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
@@ -159,9 +149,7 @@ def extremes(
 
 @command("faultgouge examples sweep && faultgouge sweep sweep.toml -o sweep")
 def sweep(
-    file: Annotated[
-        Path, Argument(metavar="SWEEP", help="The sweep, a TOML file; `faultgouge examples sweep` has one.")
-    ],
+    file: Annotated[Path, Argument(metavar="SWEEP", help="A TOML file; `faultgouge examples sweep` has one.")],
     output: Folder = Path("sweep"),
     shard: Shard = "1/1",
     workers: Workers = None,

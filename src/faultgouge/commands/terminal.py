@@ -62,10 +62,8 @@ else:
 def refuse_scene(file: Path) -> Path:
     """Refuse a scene where a stored packing is read."""
     if file.suffix == ".toml":
-        raise typer.BadParameter(
-            f"{file} is a scene, and this command reads a stored packing: run `faultgouge ramp {file} -o run.h5`, and "
-            "give run.h5"
-        )
+        run = f"run `faultgouge ramp {file} -o run.h5`, and give run.h5"
+        raise typer.BadParameter(f"{file} is a scene, and this command reads a stored packing: {run}")
     return file
 
 
@@ -237,10 +235,8 @@ def say(message: str) -> None:
 def report_fallback(equilibrium: Equilibrium) -> None:
     """Say how an equilibrium was reached, if halved increments did not reach it."""
     if equilibrium.way is not None:
-        say(
-            f"F_x = {equilibrium.fx:.10g} was reached by {equilibrium.way}, after smaller increments had failed: the "
-            "equilibrium may lie on another branch"
-        )
+        way = f"{equilibrium.way}, after smaller increments had failed"
+        say(f"F_x = {equilibrium.fx:.10g} was reached by {way}: the equilibrium may lie on another branch")
 
 
 @contextmanager

@@ -1,0 +1,303 @@
+"""The sections [perturb] and [drive] of a scene: undamped and driven runs, and the signals in them."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal, TypeAlias
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from ...analysis.files.signal_files import read_signal
+from ...analysis.responses.signals import Signal, SignalError, pulse
+from .validation import (
+    FORCE,
+    FREQUENCY,
+    LIST,
+    SPRING,
+    TIME,
+    VELOCITY,
+    WAVE,
+    NamesFile,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    refusal_sentence,
+    rule,
+)
+
+
+class Inertia(Section):
+    """The key of [perturb] that spectra and onsets read, too.
+
+    Attributes
+    ----------
+    inertia_factor : float
+        I_0 in I = I_0 m R^2: 1 in the paper, 1/2 for a uniform disk. `Scene.inertia_factor` hands it to
+        spectra and onsets as well.
+    """
+
+    inertia_factor: Positive = 1.0
+
+
+def refuse_first(cases: Iterable[tuple[str, object, str]]) -> None:
+    """Refuse the first key of (key, whether it is wrong, advice) that is wrong."""
+    for key, wrong, advice in cases:
+        if wrong:
+            raise refusal_sentence(key, advice)
+
+
+SignalKeys: TypeAlias = Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]
+
+
+class WithSignal(Section):
+    """A section with a signal, "pulse" or a file: of each kind the keys that it needs, and those that it takes."""
+
+    TAKES: ClassVar[SignalKeys] = {}
+
+    @field_validator("signal", check_fields=False)
+    @classmethod
+    def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
+        if signal in (None, "pulse"):
+            return signal
+        return str(((info.context or {}).get("folder", Path()) / str(signal)).resolve())
+
+    @model_validator(mode="after")
+    def _complete(self) -> "WithSignal":
+        signal = getattr(self, "signal", None)
+        kind = signal if signal in (None, "pulse") else "file"
+        of = {None: "a section without signal", "pulse": 'signal = "pulse"', "file": "a signal from a file"}[kind]
+        needs, takes = self.TAKES[kind or ""]
+        for key in dict.fromkeys(key for keys in self.TAKES.values() for each in keys for key in each):
+            value = getattr(self, key)
+            if key in needs and (value is None or not (value or key == "at")):
+                raise refusal_sentence(key, f"is missing: {of} needs it, above 0")
+            if key not in (*needs, *takes) and value != type(self).model_fields[key].default:
+                raise refusal_sentence(key, f"does not belong to {of}: leave it out")
+        refuse_first(self._cases())
+        try:
+            self.forcing()
+        except SignalError as error:
+            raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
+        return self
+
+    def _cases(self) -> Iterator[tuple[str, object, str]]:
+        """Keys that are missing or do not fit, for `refuse_first`."""
+        raise NotImplementedError
+
+    def forcing(self) -> Signal | None:
+        """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor."""
+        raise NotImplementedError
+
+
+class Perturb(WithSignal, Inertia):
+    """[perturb] an undamped run from an equilibrium, and its forcing: a cos(omega t), a pulse, or a signal of a file.
+
+    Its keys are that of `Inertia`, and these.
+
+    Attributes
+    ----------
+    fx : float or None
+        F_x of the equilibrium. None: chosen by the onset (:func:`~faultgouge.pywrap.onset.load_at_onset`).
+    time : float
+        Length of the run, time.
+    time_step : float or None
+        Step of velocity Verlet, time. None: from the largest eigenvalue of K.
+    target : {"top", "all"} or tuple of int
+        The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say
+        which.
+    amplitude : float
+        a, force on each forced disk along x, or, on the floor, largest velocity of the floor; 0 means no forcing. The
+        paper's is 1e-12.
+    omega : float or None
+        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks. The paper's is 0.01.
+    signal : str or None
+        "pulse", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative path counts
+        from the folder of the scene's file. None: a cos(omega t).
+    channel : str or None
+        Which trace of a record with several: the end of its id, such as "EHZ".
+    scale, stretch : float or None
+        Factors of a file's values and of its times; None is 1.
+    on : {"layer", "floor"} or None
+        What the signal is: the force on each forced disk along x (None as well), or a motion of the floor along x.
+    quantity : {"velocity", "acceleration", "displacement"} or None
+        What of the floor's motion the signal gives; None is its velocity.
+    """
+
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ("amplitude", "omega")),
+        "pulse": (("amplitude", "omega"), ("on", "quantity")),
+        "file": ((), ("on", "quantity", "channel", "scale", "stretch")),
+    }
+
+    fx: Annotated[NotNegative | None, FORCE] = None
+    time: Annotated[Positive, TIME]
+    time_step: Annotated[Positive | None, TIME] = None
+    target: Annotated[
+        Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], LIST],
+        rule('give "top", "all" or a list of disks, counted from 0'),
+    ] = "top"
+    on: Literal["layer", "floor"] | None = None
+    amplitude: Annotated[NotNegative, WAVE] = 0.0
+    omega: Annotated[NotNegative | None, FREQUENCY] = None
+    signal: Annotated[str | None, NamesFile()] = None
+    channel: str | None = None
+    scale: Number | None = None
+    stretch: Positive | None = None
+    quantity: Literal["velocity", "acceleration", "displacement"] | None = None
+
+    def _cases(self) -> Iterator[tuple[str, object, str]]:
+        of_floor = 'belongs to on = "floor": the signal is the force on the layer otherwise'
+        yield "quantity", self.quantity and self.on != "floor", of_floor
+        forced = self.amplitude > 0 and self.omega is None
+        yield "omega", forced, "is missing: an amplitude needs the frequency of its forcing"
+
+    @property
+    def cosine(self) -> tuple[float, float]:
+        """Amplitude and frequency of a forcing a cos(omega t); (0, 0) if there is none."""
+        return (self.amplitude, self.omega or 0.0) if self.signal is None else (0.0, 0.0)
+
+    def forcing(self) -> Signal | None:
+        """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor; None for a cosine."""
+        if self.signal is None:
+            return None
+        if self.signal == "pulse":
+            signal = pulse(self.omega or 0.0).scale_by(self.amplitude)
+        else:
+            scale = 1.0 if self.scale is None else self.scale
+            signal = read_signal(self.signal, self.channel).scale_by(scale, self.stretch or 1.0)
+        derivatives = {"displacement": 2, "velocity": 1, "acceleration": 0}[self.quantity or "velocity"]
+        for _ in range(derivatives if self.on == "floor" else 0):
+            signal = signal.derivative()
+        return signal
+
+    def check_samples(self, dt: float) -> None:
+        """Refuse a signal from a file that a run with the time step dt cannot follow.
+
+        Raises SignalError if rows of the file are closer than the time step, or the whole signal is.
+        """
+        signal = None if self.signal == "pulse" else self.forcing()
+        if signal is not None and signal.shortest < dt:
+            stretch = (
+                f"lower perturb.time_step, or raise perturb.stretch to {(self.stretch or 1) * dt / signal.shortest:.3g}"
+            )
+            rows = f"perturb.signal has rows that are {signal.shortest:.3g} apart"
+            raise SignalError(f"{rows}, and the time step is {dt:.3g}, too long to follow it: {stretch}")
+
+
+LOADINGS = 2.0
+"""Time for each slip of a run that ends after a number of slips, in units of the time in which the spring loads a layer
+at rest to mu F_y: the run ends then, whether it has slipped or not."""
+
+PROBE_SCALE = 1e-12
+"""Scale of a signal that shows by how much any small disturbance moves the next slip: far above the rounding of forces,
+and far below every force."""
+
+
+Stage: TypeAlias = Annotated[tuple[Annotated[Number, VELOCITY], Annotated[Positive, TIME]], Field(strict=False)]
+
+
+class Drive(WithSignal):
+    """[drive] a spring whose far end moves along x draws the upper layer.
+
+    Attributes
+    ----------
+    spring : float or "rigid"
+        Stiffness for each disk of the upper layer, force / length. "rigid": the disks of the layer have the velocity of
+        the far end along x, and are free along y and in rotation.
+    velocity : float or None
+        Of the far end, length / time.
+    protocol : tuple of (float, float) or None
+        In place of `velocity`: velocities one after the other, each with its time; 0 holds the far end. The last
+        velocity goes on if the run is longer.
+    until : float or None
+        Length of the run, time; by default that of the protocol, or twice the time in which the spring loads the layer
+        to mu F_y for each of `slips`.
+    slips : int or None
+        The run ends after so many slips. None: it goes on until `until`.
+    states : float or None
+        Time between two stored states; by default that in which the spring loads the layer by 0.016 mu F_y, or a rigid
+        drive moves by 0.01 of the smallest diameter.
+    signal : str or None
+        A force, or a motion of the floor, that comes on the way: "pulse", or a file as in [perturb]. In a scene, a
+        relative path counts from the folder of the scene's file.
+    at : float or None
+        When the signal begins, time.
+    omega : float or None
+        Angular frequency at which the spectrum of a pulse peaks, 1 / time.
+    scale : float
+        Height of a pulse, or factor of the values of a file.
+    on : {"layer", "floor"}
+        What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
+    """
+
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ()),
+        "pulse": (("at", "omega"), ("scale", "on")),
+        "file": (("at",), ("scale", "on")),
+    }
+
+    spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
+    velocity: Annotated[Number | None, VELOCITY] = None
+    protocol: Annotated[
+        Annotated[tuple[Stage, ...], LIST] | None,
+        rule("give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"),
+    ] = None
+    until: Annotated[Positive | None, TIME] = None
+    slips: Annotated[int, Field(ge=1)] | None = None
+    states: Annotated[Positive | None, TIME] = None
+    signal: Annotated[str | None, NamesFile()] = None
+    at: Annotated[NotNegative | None, TIME] = None
+    omega: Annotated[Positive | None, FREQUENCY] = None
+    on: Literal["layer", "floor"] = "layer"
+    scale: Annotated[Number, WAVE] = 1.0
+
+    def _cases(self) -> Iterator[tuple[str, object, str]]:
+        rigid, endless = self.spring == "rigid", self.until is None and self.protocol is None
+        both = (self.velocity is None) == (self.protocol is None)
+        yield "velocity", both, "or drive.protocol says how the far end of the spring moves: give one of the two"
+        moves = "protocol" if self.protocol else "velocity"
+        yield moves, self.fastest == 0, "moves nothing: give a velocity other than 0"
+        no_end = "is missing: give the length of the run, or drive.slips, after which it ends"
+        yield "until", endless and self.slips is None, no_end
+        no_slips = "is missing: a rigid drive counts no slips, and needs the length of the run"
+        yield "until", endless and rigid, no_slips
+        no_spring = "needs a spring: a rigid drive moves the layer at its velocity, and counts no slips"
+        yield "slips", rigid and self.slips is not None, no_spring
+
+    @property
+    def stages(self) -> tuple[tuple[float, float], ...]:
+        """Velocities of the far end and their times; one alone has no end."""
+        return self.protocol or ((self.velocity or 0.0, float("inf")),)
+
+    @property
+    def fastest(self) -> float:
+        """The largest velocity of the far end, taken positive."""
+        return max(abs(velocity) for velocity, _ in self.stages)
+
+    def length(self, strength: float) -> float:
+        """Length of the run, time, where friction bears up to mu F_y = `strength` on each disk of the layer."""
+        if self.until is not None:
+            return self.until
+        if self.protocol is not None:
+            return sum(time for _, time in self.protocol)
+        assert self.slips is not None
+        assert self.spring != "rigid"
+        return LOADINGS * self.slips * strength / (self.spring * self.fastest)
+
+    def without_signal(self) -> "Drive":
+        """The same drive without its signal."""
+        return self.model_copy(update={"signal": None, "at": None, "omega": None, "scale": 1.0, "on": "layer"})
+
+    def with_noise(self, number: int = 1) -> "Drive":
+        """The same drive with its signal as small as noise; each number is another noise."""
+        return self.model_copy(update={"scale": number * PROBE_SCALE})
+
+    def forcing(self) -> Signal | None:
+        """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor, by time of the run."""
+        if self.signal is None:
+            return None
+        signal = pulse(self.omega or 0.0) if self.signal == "pulse" else read_signal(self.signal)
+        signal = signal.scale_by(self.scale)
+        if self.on == "floor":
+            signal = signal.derivative()
+        return Signal(signal.time - signal.time[0] + (self.at or 0.0), signal.value)
