@@ -18,7 +18,7 @@ from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, RunFile
-    from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
+    from faultgouge.analysis.responses.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
 
 SLIP_COLUMNS = [
@@ -205,7 +205,7 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
 def growth_in(file: RunFile) -> GrowthOfRun | None:
     """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run;
     None of another file, or where the run has not begun."""
-    from faultgouge.analysis.responses.growth_of_run import growth_of_run
+    from faultgouge.analysis.responses.growth import growth_of_run
     from faultgouge.pywrap.runs.undamped import time_step
 
     if file.attributes.get("task") != "perturb" or "undamped" not in file.names_of_series:
