@@ -134,12 +134,6 @@ def few_decades(axes: Axes, count: int = 7) -> None:
             axis.set_major_locator(LogLocator(numticks=count))
 
 
-def scientific(value: float) -> str:
-    """1.2 x 10^-3 for mathtext."""
-    exponent = int(np.floor(np.log10(value)))
-    return rf"{value / 10.0**exponent:.1f} \times 10^{{{exponent}}}"
-
-
 @styled
 def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
