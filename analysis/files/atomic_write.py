@@ -87,7 +87,7 @@ def telling(path: object, says: str, errors: type[Exception] = Exception) -> Ite
     """
     try:
         yield
-    except PackingFileError:
+    except (PackingFileError, MemoryError):
         raise
     except errors as error:
         reason = str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".")
