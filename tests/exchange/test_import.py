@@ -316,7 +316,7 @@ def test_options_that_do_not_fit(tmp_path, refusal, sheared):
     for words, says in (
         (f"a.dump {' '.join(LAW)}", "does not say which disks are the upper layer: add --top"),
         ("a.dump", "add --top --kn --fy, as in `faultgouge import ... --top 10 --kn 2e5 --fy 3`"),
-        ("a.dump --top type:2 --kn -1 --fy 3", "law.kn = -1.0 is refused"),
+        ("a.dump --top type:2 --kn -1 --fy 3", "kn = -1.0 must be finite and positive"),
         ("a.dump --scene scene.toml --fx 0 --kn 1", "--kn cannot stand beside --scene"),
         (f"a.dump {layer} --width wide", "--width wide"),
         (f"a.dump {layer} --frame 2", "no --frame 2"),
