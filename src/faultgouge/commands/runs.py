@@ -49,11 +49,11 @@ def examples(
 
     scenes = files("faultgouge") / "scenes"
     shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
-    # what an example shows, and the command that runs it: its first two lines
-    heads = {key: [line.strip('# "') for line in each.read_text().splitlines()[:2]] for key, each in shelf.items()}
     if name is None:
-        for key in sorted(shelf):
-            yield "{:9} {}\n{:9} {}".format(key, heads[key][0], "", heads[key][1])
+        for key, each in sorted(shelf.items()):  # its first two lines: what it shows, and the command that runs it
+            yield "{0:9} {2}\n{1:9} {3}".format(
+                key, "", *(line.strip('# "') for line in each.read_text().splitlines()[:2])
+            )
         yield "\nfaultgouge examples NAME copies one into this folder."
         return
     # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
