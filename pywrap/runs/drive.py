@@ -203,7 +203,7 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     shortest = math.inf if signal is None else signal.shortest
     steps, period = settings.length(strength(start)) / dt, 2 * math.pi / omega if omega else math.inf
     own = float(stable_timestep(start))
-    limit = own if rigid else float(stable_timestep(replace(start, spring=float(spring))))
+    limit = own if isinstance(spring, str) else float(stable_timestep(replace(start, spring=spring)))
     follows = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
     refusals = {
         f"the run would take {steps:.1g} time steps of {dt:.3g}, which no machine does: give a shorter drive.until, "
@@ -384,8 +384,8 @@ def all_slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
     period = None if settings is None else layer_period(settings, file.packing(0))
     if settings is None or period is None or SERIES not in file.names_of_series:
         return [], None
-    columns = (file.series(SERIES)[name] for name in ("time", "force", "displacement", "kinetic_energy"))
-    return find_slips(*columns, settings.fastest, period)
+    of = file.series(SERIES)
+    return find_slips(of["time"], of["force"], of["displacement"], of["kinetic_energy"], settings.fastest, period)
 
 
 def clock_advance(path: Path, other: Path) -> float | None:

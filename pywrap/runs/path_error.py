@@ -119,7 +119,7 @@ def with_path_error(
         growth = growth_near(window.frequency, with_dashpots)
         vanishes = growth if window.dissipative else squared_gap(window.eigenvalue)
         try:
-            correction, error = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
+            correction, error = path_error(path, window.fx_onset, vanishes, window.onset.error, known)
         except PATH_FAILURES:
             return window
         return replace(window, onset=replace(window.onset, fx=window.fx_onset + correction), path_error=error)
@@ -269,7 +269,7 @@ def nearby_root(
     at, step = cache(function), max(30 * rounding, 1e-9 * fx)
     if slope and abs(at(fx) / slope) < SLOPE_TOLERANCE * reach:
         return fx - at(fx) / slope, slope
-    root, a, b = np.nan, fx, fx + step
+    a, b = fx, fx + step
     for _ in range(SECANT_STEPS):
         if at(a) == at(b):
             break
@@ -277,12 +277,10 @@ def nearby_root(
         if not abs(b - fx) < reach:
             break
         if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding):
-            root = b
-            break
+            return b, (at(b + step) - at(b)) / step
     else:
-        root = b if abs(b - a) <= NOISE_IN_ROUNDINGS * rounding else np.nan
-    if np.isfinite(root):
-        return root, (at(root + step) - at(root)) / step
+        if abs(b - a) <= NOISE_IN_ROUNDINGS * rounding:
+            return b, (at(b + step) - at(b)) / step
     # a jump: steps to either side grow until the sign changes, and the last is halved
     sign, near, far = np.sign(at(fx)), 0.0, max(NOISE_IN_ROUNDINGS * rounding, reach * 2.0**-WIDENINGS)
     while far <= reach:

@@ -61,20 +61,15 @@ def count_behind(settings: Ramp, reached: Floats) -> int:
     """
     wanted = all_loads(settings)
     count = min(len(wanted), len(reached))
-    same = wanted[:count] == reached[:count]
-    if same.all():
+    other = np.flatnonzero(wanted[:count] != reached[:count])
+    if len(other) == 0:
         return count
-    k = int(np.argmin(same))
+    k = int(other[0])
     # `until` of one of the two is no multiple of the step, and the other one goes on from there
-    if k == len(reached) - 1 and k > 0 and _lies_between(reached[k], wanted[k - 1], wanted[k]):
-        return k
-    if k == len(wanted) - 1 and k > 0 and _lies_between(wanted[k], reached[k - 1], reached[k]):
-        return len(wanted)
+    for one, more, behind in ((reached, wanted, k), (wanted, reached, len(wanted))):
+        if 0 < k == len(one) - 1 and min(more[k - 1 : k + 1]) < one[k] < max(more[k - 1 : k + 1]):
+            return behind
     raise SceneError(
         f"the run has gone to F_x = {reached[k]:g} where ramp.until leads to F_x = {wanted[k]:g}: give another name "
         "with -o, or delete it"
     )
-
-
-def _lies_between(load: float, one: float, other: float) -> bool:
-    return bool(min(one, other) < load < max(one, other))

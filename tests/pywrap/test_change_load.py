@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from reference_layer import SMALL
 
 from faultgouge.analysis import nearest_image
-from faultgouge.pywrap import Scene, SceneError, settle
+from faultgouge.pywrap import Scene, settle
 from faultgouge.pywrap.settling.change_load import LOAD_FACTOR, change_load, loads_between
 from faultgouge.pywrap.settling.settle import settle_bed
 
@@ -89,15 +89,3 @@ def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
     both = np.array([(shared[i, j], slip) for i, j, slip in pairs if (i, j) in shared])
     assert np.corrcoef(both.T)[0, 1] > 0.9
     assert not np.array_equal(*both.T)
-
-
-@pytest.mark.parametrize(
-    ("at", "says"),
-    [
-        ({"fy": -1.0}, "packing.settle_at.fy = -1.0 is refused: it should be greater than 0"),
-        ({"fx": 1.0}, "fx is no key"),
-    ],
-)
-def test_a_load_of_settling_that_is_none_is_refused(at, says):
-    with pytest.raises(SceneError, match=says):
-        scene(settle_at=at)

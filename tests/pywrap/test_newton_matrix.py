@@ -99,17 +99,6 @@ def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     assert errors[0] < 0.03 < 0.3 < errors[1]
 
 
-class _Seen(Exception):  # noqa: N818, no error
-    """A displacement that was asked for."""
-
-
-def without(packing, disk, kept):
-    """The packing in which a disk has no more than some of its contacts."""
-    c = packing.contacts
-    mine = np.flatnonzero((c.i == disk) | (c.j == disk))
-    return replace(packing, contacts=of(c, np.setdiff1d(np.arange(len(c)), mine[kept:])))
-
-
 @pytest.fixture(scope="module")
 def large():
     """A packing, its K, and its pairs of disks."""

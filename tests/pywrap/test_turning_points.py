@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.responses.hysteresis import hysteresis, layer_displacement, turning_points
@@ -69,12 +70,9 @@ def test_an_onset_is_sought_on_the_way_to_the_first_turning_point():
         ramp_loads(back)
 
 
-@pytest.mark.parametrize(
-    ("until", "says"), [([], "give a force, or a list"), (0.0, "leaves F_x at 0"), ([0.2, 0.2], "leaves F_x at 0.2")]
-)
-def test_turning_points_turn(until, says, refused_scene):
-    ramp = {"step": 0.1, "until": until}
-    assert says in refused_scene({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
+@pytest.mark.parametrize(("sections", "says"), rows_of("pywrap/refused_loads.txt"))
+def test_loads_that_make_no_sense_are_refused(sections, says, refused_scene):
+    assert says in refused_scene({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}} | sections)
 
 
 @pytest.mark.slow
