@@ -176,7 +176,7 @@ def perturb(
         *_, start = reach(scene, settings.fx, communicator)
     packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
-    target = {"top": None, "all": range(len(packing))}.get(settings.target, settings.target)
+    target = None if settings.target == "top" else range(len(packing)) if settings.target == "all" else settings.target
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
 
     part = max(SHORTEST_PART, -(-int(settings.time / dt) // MOST_PARTS))  # by the length of the run alone
