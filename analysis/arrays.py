@@ -29,20 +29,17 @@ Data = TypeVar("Data", bound="DataclassInstance")
 
 
 def same_bits(one: Any, other: Any) -> bool:
-    """Whether two instances of a dataclass have the same bits in every compared field; -0.0 differs from 0.0."""
-    for name in (field.name for field in one.__dataclass_fields__.values() if field.compare):
-        a, b = getattr(one, name), getattr(other, name)
-        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-            same = a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
-        elif issparse(a) and issparse(b):
-            same = a.shape == b.shape and all(
-                np.array_equal(getattr(a, each), getattr(b, each)) for each in ("indptr", "indices", "data")
-            )
-        else:
-            same = bool((a is None) == (b is None) and a == b)
-        if not same:
-            return False
-    return True
+    """`==` of a dataclass: whether every compared field has the same bits; -0.0 differs from 0.0."""
+    if type(one) is not type(other):
+        return NotImplemented
+
+    def bits(value: Any) -> Any:
+        if issparse(value):
+            return value.shape, *(each.tobytes() for each in (value.indptr, value.indices, value.data))
+        return (value.shape, value.dtype, value.tobytes()) if isinstance(value, np.ndarray) else value
+
+    names = (field.name for field in one.__dataclass_fields__.values() if field.compare)
+    return all(bits(getattr(one, name)) == bits(getattr(other, name)) for name in names)
 
 
 def frozen(array: NDArray) -> NDArray:

@@ -30,14 +30,14 @@ Dashpots follow from the same formulas with velocities in place of displacements
 law in three dimensions.)
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from .arrays import Floats, Indices, derive_frozen
+from .arrays import Floats, derive_frozen
 from .contacts import LinearisedContacts
 
 
@@ -96,109 +96,69 @@ def spring_of_layer(stiffness: float, top: NDArray[np.bool_], coordinates: int) 
     return csr_array((values, (rows, columns)), shape=(coordinates, coordinates))
 
 
-@dataclass(frozen=True, eq=False)
-class ContactBlocks:
-    """Where the blocks of the contacts are in a matrix of all coordinates: one for each particle, and two for each pair
-    of particles that touch.
+def contact_matrices(
+    radius: Floats, free: NDArray[np.bool_], axes: int, contacts: Sequence[LinearisedContacts], parting: ArrayLike = 0.5
+) -> list[csr_array]:
+    """-dF/dq of some kinds of contacts of the same partners, whose pattern is found once.
 
-    Attributes
+    Rows (F, T/R) and columns (translation, R theta), a block for each particle and two for each pair that touches.
+
+    Parameters
     ----------
-    radius : ndarray, shape (N,)
-        Radii of the particles, length.
-    free : ndarray of bool, shape (N,)
-        Which particles move.
+    radius, free : ndarray, shape (N,)
+        Radii of the particles, length, and which of them move.
     axes : int
         Coordinates of each particle: 3 of a disk, 6 of a sphere.
-    place : ndarray of int, shape (N + 2P,)
-        Which block of the matrix has the diagonal of each particle, and (i, j) and (j, i) of the P contacts of pairs.
-    order : ndarray of int, shape (axes B,)
-        Where the entries (axis, block) are in one axis of the rows.
-    indices, indptr : ndarray of int32
-        Columns and rows of the matrix, as in CSR.
     """
-
-    radius: Floats
-    free: NDArray[np.bool_]
-    axes: int
-    place: Indices
-    order: Indices
-    indices: NDArray[np.int32]
-    indptr: NDArray[np.int32]
-
-    @classmethod
-    def of(cls, radius: Floats, free: NDArray[np.bool_], axes: int, c: LinearisedContacts) -> "ContactBlocks":
-        """Sort the pairs of particles that have a block."""
-        count = len(radius)
-        i, j, every = c.i[~c.wall], c.j[~c.wall], np.arange(count)
-        # two particles that touch through two images have two contacts, which are added
-        pairs, place = np.unique(
-            np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True
+    c, count, pair = contacts[0], len(radius), ~contacts[0].wall
+    i, j, every, all_pair = c.i[pair], c.j[pair], np.arange(count), bool(np.all(pair))
+    # two particles that touch through two images have two contacts, which are added
+    pairs, place = np.unique(np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True)
+    row, column = np.divmod(pairs, count)
+    length, blocks = np.bincount(row, minlength=count), len(pairs)
+    before = np.concatenate([[0], np.cumsum(length)])
+    # a row has the columns of all partners along x, then those along y, ...
+    order = axes * before[row] + np.arange(blocks) - before[row] + np.arange(axes)[:, None] * length[row]
+    indices = np.empty(order.size, np.int32)
+    indices[order] = column + count * np.arange(axes)[:, None]
+    indptr = np.concatenate([[0], np.cumsum(np.tile(axes * length, axes))]).astype(np.int32)
+    partners = np.stack([c.i, np.where(pair, c.j, 0)])
+    moves = free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+    shares = [None if np.all(each) else each for each in (*moves, (moves[0] & moves[1])[pair])]
+    chosen, size, found = ([0, 1, 2, 3, 4, 5] if axes == 6 else [0, 1, 5]), axes * count, []
+    for each in contacts:
+        d = contact_derivatives(each, parting)
+        rolling, lever, shrinks = (
+            arms / radius[partners] for arms in (each.slip_arm.T, each.lever_arm.T, each.lever_slope)
         )
-        row, column = np.divmod(pairs, count)
-        length = np.bincount(row, minlength=count)
-        before = np.concatenate([[0], np.cumsum(length)])
-        # a row has the columns of all partners along x, then those along y, ...
-        order = axes * before[row] + np.arange(len(pairs)) - before[row] + np.arange(axes)[:, None] * length[row]
-        indices = np.empty(order.size, np.int32)
-        indices[order] = column + count * np.arange(axes)[:, None]
-        indptr = np.concatenate([[0], np.cumsum(np.tile(axes * length, axes))]).astype(np.int32)
-        return cls(radius, free, axes, place, order.ravel(), np.tile(indices, axes), indptr)
-
-    def matrix(self, contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> csr_array:
-        """-dF/dq of contacts of the same particles.
-
-        Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
-        """
-        diagonal, off_diagonal = self._numbers(contacts, parting)
-        axes = self.axes
-        count = axes * len(self.radius)
-        data = np.empty((axes, len(self.order)))
-        blocks = len(self.order) // axes
-        for row in range(axes):
-            numbers = np.concatenate([diagonal[row], off_diagonal[row]], axis=1)
-            data[row, self.order] = np.concatenate([np.bincount(self.place, each, blocks) for each in numbers])
-        matrix = csr_array((data.ravel(), self.indices.copy(), self.indptr.copy()), shape=(count, count))
+        diagonal, off = np.zeros((axes, axes, count)), np.empty((axes, axes, 2, len(i)))
+        block = np.empty((6, 6, len(c)))  # -dF of partner p by partner q
+        for p, q in ((0, 0), (1, 1), (0, 1), (1, 0)):
+            # +-1 for the sides of forces and translations, arms for rotations
+            sign, by = (-1.0, 1.0)[p], (1.0, -1.0)[q]
+            np.multiply(sign * by, d.force_by_u, out=block[:3, :3])
+            np.multiply(sign * rolling[q], d.force_by_w, out=block[:3, 3:])
+            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+            np.multiply(by * lever[p], d.torque_by_u, out=block[3:, :3])
+            block[3:, :3] -= by * shrinks[p] * d.growth
+            np.multiply(rolling[q] * lever[p], d.torque_by_w, out=block[3:, 3:])
+            share = shares[p] if p == q else shares[2]
+            for a, b in np.ndindex(axes, axes):
+                number = block[chosen[a], chosen[b]]
+                if p == q:
+                    number = number if share is None else number * share
+                    diagonal[a, b] += np.bincount(partners[p], number, count)
+                else:
+                    number = number if all_pair else number[pair]
+                    off[a, b, p] = number if share is None else number * share
+        data = np.empty((axes, order.size))
+        for a, b in np.ndindex(axes, axes):
+            data[a, order[b]] = np.bincount(place, np.concatenate([diagonal[a, b], off[a, b].ravel()]), blocks)
+        matrix = csr_array((data.ravel(), np.tile(indices, axes), indptr.copy()), shape=(size, size))
         matrix.has_canonical_format = True
         matrix.eliminate_zeros()
-        return matrix
-
-    def _numbers(self, c: LinearisedContacts, parting: ArrayLike) -> tuple[Floats, Floats]:
-        """The diagonal blocks, shape (axes, axes, N), and (i, j) and (j, i) of contacts of pairs, (axes, axes, 2P)."""
-        pair = ~c.wall
-        d = contact_derivatives(c, parting)
-        partners = np.stack([c.i, np.where(pair, c.j, 0)])
-        radius = self.radius[partners]
-        moves = self.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-        rolling, lever, shrinks = (each / radius for each in (c.slip_arm.T, c.lever_arm.T, c.lever_slope))
-
-        def block(p: int, q: int, row: int, column: int) -> Floats:
-            """-dF of partner p by partner q: +-1 for the sides of forces and translations, arms for rotations."""
-            by = (1.0, -1.0)[q] if column < 3 else rolling[q]
-            if row < 3:
-                number = (-1.0, 1.0)[p] * by * (d.force_by_u if column < 3 else d.force_by_w)[row, column % 3]
-            else:  # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-                number = by * lever[p] * (d.torque_by_u if column < 3 else d.torque_by_w)[row - 3, column % 3]
-                if column < 3:
-                    number -= by * shrinks[p] * d.growth[row - 3, column]
-            return number
-
-        count, between = len(self.radius), int(pair.sum())
-        shares = [None if np.all(each) else each for each in (moves[0], moves[1], (moves[0] & moves[1])[pair])]
-        axes = range(6) if self.axes == 6 else (0, 1, 5)
-        diagonal = np.zeros((len(axes), len(axes), count))
-        off = np.empty((len(axes), len(axes), 2, between))
-        for place in np.ndindex(*diagonal.shape[:2]):
-            row, column = (axes[k] for k in place)
-            for p in (0, 1):
-                own, other = block(p, p, row, column), block(p, 1 - p, row, column)
-                diagonal[place] += np.bincount(partners[p], _part(own, shares[p]), count)
-                off[place][p] = _part(other if between == len(pair) else other[pair], shares[2])
-        return diagonal, off.reshape(*diagonal.shape[:2], -1)
-
-
-def _part(numbers: Floats, share: NDArray[np.bool_] | None) -> Floats:
-    """The numbers of those that move; None if all do."""
-    return numbers if share is None else numbers * share
+        found.append(matrix)
+    return found
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

@@ -18,10 +18,9 @@ The operators are those of Q: P_1^T K P, and C likewise, where P_1 is 1 where P 
 coordinates that Q_k moves, and the coordinate k itself by 1. The mass of Q_k is the sum of masses times P.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,9 +40,10 @@ from .arrays import (
     set_frozen,
     square,
 )
-from .assembly import ContactBlocks, as_springs, spring_of_layer
+from .assembly import as_springs, contact_matrices, spring_of_layer
 from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
+from .errors import BadInputError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -55,7 +55,11 @@ UNKNOWN_SLIPS = (
 """Why no verdict is possible where slips are not known."""
 
 
-@dataclass(frozen=True, init=False, eq=False)
+BY_DEFAULT: Any = None
+"""What an argument is whose value follows from the others."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Configuration:
     """Particles of a packing in two or three dimensions, with their linearised contacts.
 
@@ -130,107 +134,69 @@ class Configuration:
     origin: Floats
     periodic: NDArray[np.bool_]
     load: Floats
-    free: NDArray[np.bool_]
-    ids: Indices
-    kind: Indices
-    fx: float
-    load_error: float
-    top: NDArray[np.bool_]
-    drag_rate: float
-    stiffness: csr_array | None
-    damping: csr_array | None
-    operator_error: float
-    jump: Floats
-    wall_force: Floats
-    constraint: csr_array | None
-    spring: float
-    slips_known: bool
-    proof: float | None = field(compare=False)
-    remarks: tuple[str, ...] = field(compare=False)
+    free: NDArray[np.bool_] = BY_DEFAULT
+    ids: Indices = BY_DEFAULT
+    kind: Indices = BY_DEFAULT
+    fx: float = 0.0
+    load_error: float = 0.0
+    top: NDArray[np.bool_] = BY_DEFAULT
+    drag_rate: float = 0.0
+    stiffness: csr_array | None = None
+    damping: csr_array | None = None
+    operator_error: float = 0.0
+    jump: Floats = BY_DEFAULT
+    wall_force: Floats = BY_DEFAULT
+    constraint: csr_array | None = None
+    spring: float = 0.0
+    slips_known: bool = True
+    proof: float | None = field(default=None, compare=False)
+    remarks: tuple[str, ...] = field(default=(), compare=False)
 
-    def __init__(
-        self,
-        *,
-        dimension: int,
-        position: ArrayLike,
-        radius: ArrayLike,
-        mass: ArrayLike,
-        inertia: ArrayLike,
-        contacts: LinearisedContacts,
-        box: ArrayLike,
-        origin: ArrayLike,
-        periodic: ArrayLike,
-        load: ArrayLike,
-        free: ArrayLike | None = None,
-        ids: ArrayLike | None = None,
-        kind: ArrayLike | None = None,
-        fx: float = 0.0,
-        load_error: float = 0.0,
-        top: ArrayLike | None = None,
-        drag_rate: float = 0.0,
-        stiffness: csr_array | None = None,
-        damping: csr_array | None = None,
-        operator_error: float = 0.0,
-        jump: ArrayLike | None = None,
-        wall_force: ArrayLike | None = None,
-        constraint: csr_array | None = None,
-        spring: float = 0.0,
-        slips_known: bool = True,
-        proof: float | None = None,
-        remarks: Iterable[str] = (),
-    ) -> None:
-        n = len(np.atleast_1d(np.asarray(radius)))
-        if dimension not in (2, 3) or n == 0:
-            raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {dimension}.")
-        if (stiffness is None) != (damping is None):
+    def __post_init__(self) -> None:
+        n, d = np.size(self.radius), self.dimension
+        if d not in (2, 3) or n == 0:
+            raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {d}.")
+        if (self.stiffness is None) != (self.damping is None):
             raise ValueError("stiffness and damping are given together.")
-        given = {"radius": radius, "mass": mass, "inertia": inertia}
-        values: dict[str, object] = {k: positive_each(k, floats(k, each, (n,))) for k, each in given.items()}
-        none = np.zeros(n)
-        arrays = (
-            ("position", position, (n, dimension)),
-            ("box", box, (3, 3)),
-            ("origin", origin, (3,)),
-            ("load", load, (n, 2, 3)),
-            ("jump", none if jump is None else jump, (n,)),
-            ("wall_force", none if wall_force is None else wall_force, (n,)),
-        )
-        values |= {name: floats(name, each, shape) for name, each, shape in arrays}
-        scalars = {"fx": fx, "load_error": load_error, "drag_rate": drag_rate, "operator_error": operator_error}
-        values |= {name: number(name, each) for name, each in (scalars | {"spring": spring}).items()}
-        set_frozen(
-            self,
-            **values,
-            dimension=int(dimension),
-            contacts=contacts,
-            periodic=booleans("periodic", periodic, 3),
-            free=booleans("free", np.ones(n, bool) if free is None else free, n),
-            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
-            ids=integers("ids", np.arange(1, n + 1) if ids is None else ids),
-            kind=integers("kind", np.ones(n, int) if kind is None else kind),
-            slips_known=bool(slips_known),
-            proof=None if proof is None else number("proof", proof),
-            remarks=tuple(remarks),
-        )
-        for name, matrix in {"constraint": constraint, "stiffness": stiffness, "damping": damping}.items():
-            set_frozen(self, **{name: None if matrix is None else square(name, matrix, self.coordinates)})
+        given = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        zeros, no = np.zeros(n), np.zeros(n, bool)
+        usual = {"free": ~no, "top": no, "ids": np.arange(1, n + 1), "kind": np.ones(n, int)}
+        for name, value in (usual | {"jump": zeros, "wall_force": zeros}).items():
+            given[name] = value if given[name] is None else given[name]
+        shapes = {"position": (n, d), "box": (3, 3), "origin": (3,), "load": (n, 2, 3)}
+        values: dict[str, object] = {
+            name: floats(name, given[name], shape)
+            for name, shape in (shapes | dict.fromkeys(("jump", "wall_force"), (n,))).items()
+        }
+        for name in ("radius", "mass", "inertia"):
+            values[name] = positive_each(name, floats(name, given[name], (n,)))
+        for name in ("fx", "load_error", "drag_rate", "operator_error", "spring"):
+            values[name] = number(name, given[name])
+        for name, count in (("periodic", 3), ("free", n), ("top", n)):
+            values[name] = booleans(name, given[name], count)
+        for name in ("stiffness", "damping", "constraint"):
+            values[name] = None if given[name] is None else square(name, given[name], self.axes * n)
+        values |= {name: integers(name, given[name]) for name in ("ids", "kind")}
+        proof = None if self.proof is None else number("proof", self.proof)
+        set_frozen(self, **values, slips_known=bool(self.slips_known), proof=proof, remarks=tuple(self.remarks))
         if len(self.ids) != n or len(self.kind) != n:
             raise ValueError(f"ids and kind must be lists of {n} integers, one for each particle.")
-        unique, count = np.unique(self.ids, return_counts=True)
+        unique, times = np.unique(self.ids, return_counts=True)
         if len(unique) < n:
-            raise ValueError(f"Two particles have the ID {unique[count > 1][0]}: give each its own.")
-        if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
+            raise ValueError(f"Two particles have the ID {unique[times > 1][0]}: give each its own.")
+        c = self.contacts
+        if len(c) and max(c.i.max(), c.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
-        if dimension == 2:
-            scale = np.abs(contacts.normal_force) + np.linalg.norm(contacts.tangential_force, axis=1)
-            across = np.abs(contacts.normal[:, 2]) > UNIT_ERROR
-            refuse_first(across, "the normal {} of disks is not in the plane", contacts.normal)
-            outside = np.abs(contacts.tangential_force[:, 2]) > UNIT_ERROR * scale
-            refuse_first(outside, "the tangential force {} on a disk is not in the plane", contacts.tangential_force)
+        if d == 2:
+            scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
+            across = np.abs(c.normal[:, 2]) > UNIT_ERROR
+            refuse_first(across, "the normal {} of disks is not in the plane", c.normal)
+            outside = np.abs(c.tangential_force[:, 2]) > UNIT_ERROR * scale
+            refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit."""
-        return same_bits(self, other) if isinstance(other, Configuration) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.fx, self.position.tobytes()))
@@ -255,6 +221,36 @@ class Configuration:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    law = None
+    fy = 0.0
+    """A :class:`Packing` has a law and a load F_y."""
+
+    @property
+    def in_words(self) -> str:
+        """How many of which particles."""
+        return f"{counted(len(self), 'disk' if self.dimension == 2 else 'sphere')} as LAMMPS left them"
+
+    @property
+    def box_length(self) -> float | None:
+        """Period along x, length; None without."""
+        return float(self.box[0, 0]) if self.periodic[0] else None
+
+    @property
+    def planes(self) -> tuple[tuple[int, float, float], ...]:
+        """Planes along the axes that particles touch: the axis, the sign along it of its inner side, and its place."""
+        c, d = self.contacts, self.dimension
+        flat = np.flatnonzero(c.wall & (np.abs(c.normal[:, :d]).max(axis=1) > 1 - 1e-9))
+        axis = np.argmax(np.abs(c.normal[flat]), axis=1)
+        sign = np.sign(c.normal[flat, axis])
+        place = self.position[c.i[flat], axis] - sign * (self.radius[c.i[flat]] - c.overlap[flat])
+        sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
+        return tuple((a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
+
+    @property
+    def slip_share(self) -> Floats:
+        """Not known of a Configuration: a BadInputError."""
+        raise BadInputError("A packing of LAMMPS has forces and no slips: let colours show mobilised, force or none.")
 
     @property
     def axes(self) -> int:
@@ -409,44 +405,38 @@ class Configuration:
         """
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
-        if self.stiffness is None:
-            return self._with_spring(self._blocks.matrix(self.contacts, parting))
-        if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
+        if self.stiffness is not None and (np.any(np.asarray(parting) != 0.5) or np.any(sliding)):
             raise ValueError(
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
                 "sides of Coulomb's bound: leave parting and sliding out."
             )
-        return self.stiffness.copy()
+        return self._assembled((self.contacts,), parting)[0] if self.stiffness is None else self.stiffness.copy()
 
     def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
         """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
-        return self._damping(self._blocks) if self.damping is None else self.damping.copy()
+        return self._assembled((as_springs(self.contacts),))[0] if self.damping is None else self.damping.copy()
 
     def assembled_operators(self) -> tuple[csr_array, csr_array]:
         """K and C, whose pattern is the same: it is found once."""
-        if self.stiffness is not None:
-            return self.assembled_stiffness(), self.assembled_damping()
-        blocks = self._blocks
-        return self._with_spring(blocks.matrix(self.contacts)), self._damping(blocks)
+        if self.stiffness is not None and self.damping is not None:
+            return self.stiffness.copy(), self.damping.copy()
+        k, c = self._assembled((self.contacts, as_springs(self.contacts)))
+        return k, c
 
-    @property
-    def _blocks(self) -> ContactBlocks:
-        """Where the blocks of the contacts are in K and C."""
-        return ContactBlocks.of(self.radius, self.free, self.axes, self.contacts)
-
-    def _with_spring(self, matrix: csr_array) -> csr_array:
-        """K of contacts and of the spring that draws the layer, of the coordinates that lead."""
-        if self.spring:
-            matrix = csr_array(matrix + spring_of_layer(self.spring, self.top, self.coordinates))
-        return self.project(matrix)
-
-    def _damping(self, blocks: ContactBlocks) -> csr_array:
-        """C of dashpots and drag."""
-        matrix = self.project(blocks.matrix(as_springs(self.contacts)))
-        if not self.drag_rate:
-            return matrix
-        moves = np.ones(matrix.shape[0]) if self.constraint is None else self.coordinate_free
-        return csr_array(matrix + diags_array(self.drag_rate * self.coordinate_mass * moves))
+    def _assembled(self, kinds: tuple[LinearisedContacts, ...], parting: ArrayLike = 0.5) -> list[csr_array]:
+        """K of contacts and of the spring of the layer, C of dashpots and drag, of the coordinates that lead."""
+        made = contact_matrices(self.radius, self.free, self.axes, kinds, parting)
+        for k, (each, matrix) in enumerate(zip(kinds, made, strict=True)):
+            if each is not self.contacts:
+                made[k] = self.project(matrix)
+                if self.drag_rate:
+                    moves = np.ones(self.coordinates) if self.constraint is None else self.coordinate_free
+                    made[k] = csr_array(made[k] + diags_array(self.drag_rate * self.coordinate_mass * moves))
+            elif self.spring:
+                made[k] = self.project(csr_array(matrix + spring_of_layer(self.spring, self.top, self.coordinates)))
+            else:
+                made[k] = self.project(matrix)
+        return made
 
     @cached_property
     def net_force(self) -> Floats:

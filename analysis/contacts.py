@@ -146,7 +146,7 @@ class LinearisedContacts:
 
     def __eq__(self, other: object) -> bool:
         """Whether every array is the same to the bit."""
-        return same_bits(self, other) if isinstance(other, LinearisedContacts) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.overlap.tobytes()))

@@ -13,15 +13,6 @@ from .series import draw_cycle, draw_series
 from .style import INK, save, save_as, styled
 
 __all__ = [
-    "INK",
-    "PairCurve",
-    "draw_cycle",
-    "draw_mode",
-    "draw_packing",
-    "draw_pair",
-    "draw_series",
-    "render",
-    "save",
-    "save_as",
-    "styled",
-]
+    "INK", "PairCurve", "draw_cycle", "draw_mode", "draw_packing", "draw_pair", "draw_series", "render", "save",
+    "save_as", "styled",
+]  # fmt: skip

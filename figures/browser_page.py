@@ -18,17 +18,26 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import Configuration, Packing, Stability
+from faultgouge.analysis import Configuration, Stability
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 
-from .disk_view import View, cell_of, walls_of, within_cell
-from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
+from .disk_view import View, cut, in_box
+from .followed_pairs import (
+    SECONDS_OF_1000,
+    FollowedPair,
+    Progress,
+    RampEigenvalues,
+    follow_eigenvalues,
+    members_of,
+)
+from .mode import displacement
 from .packing import LEAST_SHARE, faces_of
 from .pair import curve_through
+from .spheres import ENDS
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 
 BYTES_OF_MODES = 1.2e6
@@ -40,11 +49,7 @@ FACES = ["#ffffff", BULK, UPPER, FLOOR]
 FEWEST_ON_PAGE, MOST_ON_PAGE = 4, 40
 """Pairs of a page, at least and at most."""
 
-
 SINGLE = np.finfo(np.float32)
-
-IMAGE_MARGIN = 0.5
-"""Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""
 
 
 class Axis(NamedTuple):
@@ -92,17 +97,20 @@ def write_view(
     """
     axis, first = axis or Axis.of_loads(packings), packings[0]
     followed = follow_eigenvalues(packings, progress)
-    verdicts, opens = followed.verdicts, _best_frame(followed.verdicts)
+    verdicts = followed.verdicts
     room = BYTES_OF_MODES / (2 * first.coordinates * len(packings))
     pairs = followed.pairs[: int(np.clip(room, FEWEST_ON_PAGE, MOST_ON_PAGE))]
     # on each part of the path the axis rises, or falls
     ends = [0, *turning_points(axis.values), len(packings) - 1] if len(packings) > 1 else []
     legs = [np.arange(a, b + 1) for a, b in pairwise(ends)]
-    disks = [each for each in packings if isinstance(each, Packing)]
-    moved = layer_displacement(disks)[:, 0].tolist() if len(disks) > 1 else []
+    disks = [each for each in packings if each.law is not None] if len(packings) > 1 else []
+    moved = layer_displacement(disks)[:, 0].tolist() if disks else []
     seen = {} if series is None else {name: series[name][series["msd"] > 0] for name in ("time", "msd")}
     images = [(_spheres if first.dimension == 3 else _disks)(packing) for packing in packings]
-    low, high = np.min([each.low for each in images], axis=0), np.max([each.high for each in images], axis=0)
+    # the page opens at the fastest growth of a packing that rests, else of any; at the last one if nothing grows
+    rates = [[v.growth_rate if v.stable is False else 0.0 for v in verdicts]]
+    rates += [[0.0 if v.stable else v.growth_rate for v in verdicts], [v.undamped.growth_rate for v in verdicts]]
+    opens = next((int(np.argmax(each)) for each in rates if max(each) > 0), len(packings) - 1)
     data = {
         "axis": {"name": axis.name} if legs else None,
         "legs": [leg.tolist() for leg in legs],
@@ -110,7 +118,7 @@ def write_view(
         "dissipative": any(verdict.dissipative for verdict in verdicts),
         "frames": [_frame(packing, axis, images[k], followed, k) for k, packing in enumerate(packings)],
         "pairs": [_pair(pair, axis, legs) for pair in pairs],
-        "cycle": {"moved": moved, "force": [packing.fx for packing in disks]} if moved else None,
+        "cycle": {"moved": moved, "force": [each.fx for each in disks]} if disks else None,
         "series": seen or None,
         "dimension": first.dimension,
         "radius": first.radius,
@@ -119,11 +127,20 @@ def write_view(
         "edge": EDGE,
         "ink": INK,
         "wall": FLOOR,
-        "extent": [low.tolist(), high.tolist()],
+        "extent": [np.min([each.low for each in images], axis=0).tolist(),
+                   np.max([each.high for each in images], axis=0).tolist()],
         "periodic": images[0].periodic,
-        "walls": [wall._asdict() for wall in walls_of(first)],
+        "walls": [dict(zip(("axis", "sign", "place"), plane, strict=True)) for plane in first.planes],
         "corners": images[0].corners.tolist(),
     }  # fmt: skip
+    own, walled = first.configuration, bool(first.planes) or not first.configuration.free.all()
+    kinds = {
+        "Yellow: upper layer.": first.top.any(),
+        "Red: walls, and particles that are held.": walled and not first.top.any(),
+        "White: rattlers, which touch nothing.": len(own.rattlers),
+        "Drag to turn.": first.dimension == 3,
+        "Width of a bar: normal force.": True,
+    }
     folder = files(__package__ or "") / "view"
     loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True)
@@ -131,25 +148,16 @@ def write_view(
         title=title,
         axis=axis if legs else None,
         count=len(packings),
-        **{name: data[name] for name in ("opens", "dissipative")},
+        opens=opens,
+        dissipative=data["dissipative"],
         grows=any(verdict.undamped.growth_rate for verdict in verdicts),
-        cycle=bool(moved),
+        cycle=bool(disks),
         series=series is not None,
         gradient=", ".join(_colours(8)),
-        legend=_legend(first),
+        legend=" ".join(words for words, shown in kinds.items() if shown),
         data=json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
     )
     write_text(path, page)
-
-
-def _best_frame(verdicts: Sequence[Stability]) -> int:
-    """Where the page opens: the fastest growth of a packing that rests, else of any; the last one if nothing grows."""
-    unstable = [verdict.growth_rate if verdict.stable is False else 0.0 for verdict in verdicts]
-    not_stable = [0.0 if verdict.stable else verdict.growth_rate for verdict in verdicts]
-    for rates in (unstable, not_stable, [verdict.undamped.growth_rate for verdict in verdicts]):
-        if max(rates) > 0:
-            return int(np.argmax(rates))
-    return len(verdicts) - 1
 
 
 class _Images(NamedTuple):
@@ -184,29 +192,26 @@ class _Images(NamedTuple):
 
 
 def _disks(packing: HasConfiguration) -> _Images:
-    view = View.of(packing, margin=IMAGE_MARGIN * packing.radius.max())
+    view, none = View.of(packing, margin=0.5 * packing.radius.max()), np.zeros((0, 3))
     place, start, end = (np.pad(each, ((0, 0), (0, 1))) for each in (view.place, view.start, view.end))
     room = 1.1 if packing.top.any() else 0.3  # for the arrow of the load
     top = float((packing.position[:, 1] + packing.radius).max()) + room * float(packing.radius.min())
-    bars, high, none = np.stack([start, end], axis=1), np.array([view.high[0], top]), np.zeros((0, 3))
+    bars, high = np.stack([start, end], axis=1), np.array([view.high[0], top])
     return _Images(place, view.disk, bars, view.contact, view.low, high, none, bool(len(view.edges)))
 
 
 def _spheres(packing: HasConfiguration) -> _Images:
     """Spheres within the box; of a contact through a periodic side each partner has half."""
     own: Configuration = packing.configuration
-    cell, place, c, branch = cell_of(own), within_cell(own, own.position), own.contacts, own.branch
+    (cell, place), c, branch, reach = in_box(own), own.contacts, own.branch, own.radius[:, None]
     bars = np.stack([place[c.i], place[c.i] - branch], axis=1)
     apart = np.linalg.norm(bars[:, 1] - place[c.j], axis=1) > 1e-6 * own.radius.max()
     through = np.flatnonzero(~c.wall & apart)
     bars[through, 1] += 0.5 * branch[through]
     again = np.stack([place[c.j[through]] + 0.5 * branch[through], place[c.j[through]]], axis=1)
-    low, high = (place - own.radius[:, None]).min(axis=0), (place + own.radius[:, None]).max(axis=0)
-    for wall in walls_of(own):
-        wall.cut(low, high)
+    low, high = cut(own.planes, (place - reach).min(axis=0), (place + reach).max(axis=0))
     edges = np.where(own.periodic[:, None], cell, np.diag(high - low))
-    begin = np.where(own.periodic, own.origin, low)
-    corners = np.array([begin + sum((number >> k & 1) * edges[k] for k in range(3)) for number in range(8)])
+    corners = np.where(own.periodic, own.origin, low) + ENDS[:, ::-1] @ edges
     contact = np.concatenate([np.arange(len(c)), through])
     return _Images(place, np.arange(len(own)), np.concatenate([bars, again]), contact, low, high, corners, False)
 
@@ -251,18 +256,14 @@ def _frame(packing: HasConfiguration, axis: Axis, images: _Images, followed: Ram
 
 def sentences_of(verdict: Stability) -> list[str]:
     """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound."""
-
-    def are(count: int | None, noun: str, kind: str, plural: str | None = None) -> list[str]:
-        return [f"{counted(count, noun, plural)} {'is' if count == 1 else 'are'} {kind}"] if count else []
-
-    undamped = verdict.undamped
-    found = are(undamped.pairs, "pair of eigenvalues", "complex", "pairs of eigenvalues")
-    found += are(undamped.negative, "eigenvalue", "negative")
-    says = [verdict.sentences[0], *([" and ".join(found)] if found else [])]
+    u, at = verdict.undamped, verdict.at_bound
+    counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
+    found = " and ".join(counted(count, noun) for noun, count in counts.items() if count)
     if found and verdict.dissipative:
-        says[1] = f"without dissipation {says[1]}, D would grow as exp({undamped.growth_rate:.3g} t)"
-    says += [*are(verdict.at_bound, "contact", "at Coulomb's bound"), *verdict.remarks]
-    return [f"{each[0].upper()}{each[1:]}." for each in says]
+        found = f"without dissipation {found}, D would grow as exp({u.growth_rate:.3g} t)"
+    bound = f"{counted(at, 'contact')} at Coulomb's bound" if at else ""
+    says = [verdict.sentences[0], found, bound, *verdict.remarks]
+    return [f"{each[0].upper()}{each[1:]}." for each in says if each]
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:
@@ -280,7 +281,8 @@ def _mean_and_square(eigenvalues: np.ndarray) -> dict[str, Floats]:
 
 def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:
     """Two rows of 8 bits, with their scales: real and imaginary part of a complex mode, or two real modes."""
-    first, second = pair.modes[k]
+    plane = pair.planes[k]
+    first, second = (displacement(pair.packings[k], vector) for vector in (plane.right @ members_of(plane)[1]).T)
     rows = np.stack([first.real, first.imag if pair.eigenvalues[k, 0].imag else second.real])
     largest = np.abs(rows).max(axis=(1, 2)) / 127
     whole = np.rint(rows / np.where(largest > 0, largest, 1.0)[:, None, None])
@@ -289,17 +291,3 @@ def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:
 
 def _colours(count: int) -> list[str]:
     return [to_hex(MOBILIZATION(k / (count - 1))) for k in range(count)]
-
-
-def _legend(packing: HasConfiguration) -> str:
-    """Meaning of the colours of the particles, in words."""
-    configuration = packing.configuration
-    red = configuration.contacts.wall.any() or not configuration.free.all()
-    kinds = {
-        "Yellow: upper layer.": packing.top.any(),
-        "Red: walls, and particles that are held.": red and not packing.top.any(),
-        "White: rattlers, which touch nothing.": len(packing.rattlers),
-        "Drag to turn.": packing.dimension == 3,
-        "Width of a bar: normal force.": True,
-    }
-    return " ".join(words for words, shown in kinds.items() if shown)

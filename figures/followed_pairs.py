@@ -7,8 +7,7 @@ complex, the two real modes of the last load that are closest to merging are fol
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,12 @@ from faultgouge.analysis import (
     closest_to_meeting,
     stability,
 )
+from faultgouge.analysis.arrays import Complexes
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, is_zero, zero_uncertainties, zero_uncertainty
 from faultgouge.analysis.windows import Motions, System, force_bearing
 from faultgouge.analysis.windows.pair_over_load import Plane
-
-from .mode import Complexes, displacement
 
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
@@ -37,8 +35,7 @@ SECONDS_OF_1000 = 18.0
 """Seconds that all modes of 1,000 disks take on one core; the time grows as the cube of the number of disks."""
 
 
-@dataclass(frozen=True, eq=False)
-class FollowedPair:
+class FollowedPair(NamedTuple):
     """A pair of eigenvalues along a ramp of S loads.
 
     Attributes
@@ -56,27 +53,13 @@ class FollowedPair:
     planes: Mapping[int, Plane]
     packings: Sequence[HasConfiguration]
 
-    @cached_property
-    def modes(self) -> Complexes:
-        """Displacements of both members, see :func:`~faultgouge.figures.mode.displacement`, shape (S, 2, axes, N).
-
-        They are zero where the pair is unknown.
-        """
-        last = self.packings[-1]
-        modes = np.zeros((len(self.packings), 2, last.axes, len(last)), dtype=np.complex128)
-        for k, pair in self.planes.items():
-            vectors = pair.right @ _members_of(pair)[1]
-            modes[k] = [displacement(self.packings[k], vector) for vector in vectors.T]
-        return modes
-
     @property
     def growth(self) -> np.ndarray:
         """Growth rate of D without dissipation, 1 / time, shape (S,); nan where the pair is unknown."""
         return 2 * np.abs(np.sqrt(self.eigenvalues[:, 0]).imag)
 
 
-@dataclass(frozen=True, eq=False)
-class RampEigenvalues:
+class RampEigenvalues(NamedTuple):
     """Eigenvalues along a ramp.
 
     Attributes
@@ -143,7 +126,7 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
     for known in pairs:
         eigenvalues = np.full((len(packings), 2), complex(np.nan, np.nan))
         for k, plane in known.items():
-            eigenvalues[k] = _members_of(plane)[0]
+            eigenvalues[k] = members_of(plane)[0]
         found.append(FollowedPair(eigenvalues, known, packings))
     return RampEigenvalues(values, verdicts, sorted(found, key=lambda pair: -np.nanmax(pair.growth)))
 
@@ -181,16 +164,11 @@ def _spectrum_of(packing: HasConfiguration, modes: Motions) -> Spectrum:
     pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
     below = is_negative(found.values, found.overlap, rounding, zero)
     free = ~below & is_zero(found.values, found.overlap, zero_uncertainty(packing, rounding), zero)
-    return Spectrum(
-        eigenvalues=found.values,
-        pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
-        negative=np.sort(found.values[below].real),
-        noise_pairs=0,  # they have lost their imaginary parts
-        rattlers=packing.rattlers,
-        rounding=rounding,
-        free=int(free.sum()),
-        packing=packing,
-    )
+    pairs.sort(key=lambda pair: -pair.growth_rate)
+    return Spectrum(  # without noise: such pairs have lost their imaginary parts
+        found.values, tuple(pairs), np.sort(found.values[below].real), noise_pairs=0, rattlers=packing.rattlers,
+        rounding=rounding, free=int(free.sum()), packing=packing,
+    )  # fmt: skip
 
 
 def _about_to_meet(modes: Motions) -> list[Plane]:
@@ -202,7 +180,7 @@ def _about_to_meet(modes: Motions) -> list[Plane]:
     return [Plane.of(modes, (first, second))]
 
 
-def _members_of(pair: Plane) -> tuple[Complexes, Complexes]:
+def members_of(pair: Plane) -> tuple[Complexes, Complexes]:
     """Eigenvalues of both members, and their eigenvectors on the plane in columns."""
     own, vectors = np.linalg.eig(pair.block)
     order = np.lexsort((-own.imag, own.real))

@@ -6,8 +6,7 @@ largest displacement.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,17 +18,13 @@ from faultgouge.analysis import BadInputError, Modes, closest_to_meeting, normal
 from faultgouge.analysis.arrays import Complexes, Floats
 from faultgouge.analysis.has_configuration import HasConfiguration
 
-from .disk_view import View
 from .packing import PackingArtist, figure_for
 from .spheres import INTO, draw_spheres, flat
-from .style import EDGE, INK, figure_of, require_axes, styled
+from .style import INK, figure_of, require_axes, styled
 
 TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
 radius: a few disks that move far leave the arrows of all others to be seen."""
-
-FILM_DISPLACEMENT = 0.5
-"""Largest displacement of a disk in a film, in units of the largest radius."""
 
 ORTHOGONAL_COSINE = 1e-6
 """Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
@@ -45,12 +40,7 @@ ARROWS: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "colo
 ARROWS |= {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "minlength": 0.8}
 
 
-class ModeError(BadInputError):
-    """A mode that a packing does not have, in one sentence."""
-
-
-@dataclass(frozen=True, eq=False)
-class ModeShape:
+class ModeShape(NamedTuple):
     """How the particles of a packing move in a mode.
 
     Attributes
@@ -89,22 +79,18 @@ class ModeShape:
 
     @property
     def plain(self) -> str:
-        """The text of `words` for a terminal."""
+        """Eigenvalue, participation ratio and share of rotation, for a terminal."""
         sign = f" +- {abs(self.eigenvalue.imag):.6g} i" if self.is_complex else ""
-        return (
-            f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, participation ratio "
-            f"{self.participation:.3f}, rotation {100 * self.rotation:.1f} % of the kinetic energy"
-        )
+        head = f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, participation ratio "
+        return f"{head}{self.participation:.3f}, rotation {100 * self.rotation:.1f} % of the kinetic energy"
 
     @property
     def words(self) -> str:
-        """Eigenvalue, participation ratio and share of rotation, for a caption."""
+        """The same for a caption."""
         sign = rf" \pm {abs(self.eigenvalue.imag):.4g}\,i" if self.is_complex else ""
-        return (
-            rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$"
-            f"\nparticipation ratio {self.participation:.2f}, "
-            f"rotation {100 * self.rotation:.0f} % of the kinetic energy"
-        )
+        head = rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$"
+        more = f"rotation {100 * self.rotation:.0f} % of the kinetic energy"
+        return f"{head}\nparticipation ratio {self.participation:.2f}, {more}"
 
 
 def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
@@ -121,16 +107,16 @@ def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list
     """A mode of a packing by its number, or those that make it unstable, or are about to; with a description.
 
     Without a number: the member with positive imaginary part of the fastest growing pair; without one, the two real
-    modes that are closest to a coalescence. Raises ModeError if the packing has no such mode.
+    modes that are closest to a coalescence. Raises BadInputError if the packing has no such mode.
     """
     modes = normal_modes(packing)
     count = len(modes.values)
     if number is not None:
         if not 0 <= number < count:
-            raise ModeError(f"mode {number}: the packing has {count} modes, counted from 0")
+            raise BadInputError(f"mode {number}: the packing has {count} modes, counted from 0")
         return [ModeShape.of(packing, modes, number)], f"mode {number} of {count}"
     if count < 2:
-        raise ModeError(f"the packing has {count} modes, and a pair is two of them")
+        raise BadInputError(f"the packing has {count} modes, and a pair is two of them")
     pairs = spectrum(packing).pairs  # fastest growing first, without those that are rounding noise
     if pairs:
         words = "the complex pair" if len(pairs) == 1 else f"the fastest growing of {len(pairs)} complex pairs"
@@ -138,55 +124,12 @@ def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
         where, later = (f"at F_x = {packing.fx:g} ", "a later --frame, or ") if packing.top.any() else ("", "")
-        raise ModeError(
+        raise BadInputError(
             f"{where}all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet: "
             f"take {later}a mode by its number"
         )
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
     return [ModeShape.of(packing, modes, each) for each in (first, second)], words
-
-
-class ModeArtist:
-    """A mode of disks on axes, whose phase can be changed from frame to frame.
-
-    Parameters
-    ----------
-    points : float, optional
-        Points per unit of length; as the axes stand now by default.
-    moves : bool
-        Whether disks move; otherwise arrows show how they would.
-    """
-
-    def __init__(
-        self, axes: Axes, packing: HasConfiguration, mode: ModeShape, points: float | None = None, moves: bool = False
-    ) -> None:
-        self.mode = mode
-        self.reach = FILM_DISPLACEMENT * packing.radius.max() if moves else _arrow_scale(packing, mode)
-        view = View.of(packing, margin=self.reach if moves else 0.0)
-        self.artist = PackingArtist(axes, packing, view=view, points=points)
-        still = np.zeros(len(view.disk))
-        self.artist.chains.set(color=EDGE, linewidth=0.4 if moves else 0.0, zorder=2)
-        self.artist.disks.set(array=still, cmap="RdBu_r", norm=Normalize(-1, 1))
-        self.arrows = None if moves else axes.quiver(*view.place.T, still, still, width=0.007, **ARROWS)
-        self.rotates = np.abs(mode.displacement[2]).max() or 1.0
-
-    def magnification(self, phase: float) -> float:
-        """1, 2 or 5 times a power of ten by which the motion at a phase stays below the largest of the mode."""
-        moved = self.mode.at(phase)
-        largest = max(np.hypot(*moved[:2]).max(), np.abs(moved[2]).max() / self.rotates)
-        if not largest:
-            return 1.0
-        unit = float(10 ** np.floor(-np.log10(largest)))
-        return max(step * unit for step in (1, 2, 5) if step == 1 or step * unit * largest <= 1)
-
-    def show(self, phase: float, magnified: float = 1.0) -> None:
-        """Draw the mode at a phase, its motion magnified."""
-        moved, disk = magnified * self.mode.at(phase), self.artist.view.disk
-        self.artist.disks.set_array(moved[2, disk] / self.rotates)
-        if self.arrows is None:
-            self.artist.move(self.reach * moved[:2].T)
-        else:
-            self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
 
 
 def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
@@ -199,21 +142,26 @@ def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
 
 def _show_mode(axes: Axes, packing: HasConfiguration, mode: ModeShape, phase: float, points: float | None) -> None:
     """A mode at a phase on axes, with its numbers; of spheres at its largest displacement."""
-    title = mode.words
+    title, moved, reach = mode.words, mode.at(phase), _arrow_scale(packing, mode)
     if packing.dimension == 2:
-        artist = ModeArtist(axes, packing, mode, points)
-        magnified = artist.magnification(phase) if phase else 1.0
-        artist.show(phase, magnified)
+        turn, magnified = np.abs(mode.displacement[2]).max() or 1.0, 1.0
         if phase:  # close to an onset the two moments differ by orders of magnitude
+            largest = max(np.hypot(*moved[:2]).max(), np.abs(moved[2]).max() / turn) or 1.0
+            unit = 10.0 ** np.floor(-np.log10(largest))
+            magnified = float(max(step * unit for step in (1, 2, 5) if step == 1 or step * unit * largest <= 1))
             scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
             title = f"a quarter of a period later\n{scale}"
+        artist = PackingArtist(axes, packing, points=points)
+        disk, moved = artist.view.disk, magnified * moved
+        artist.chains.set(linewidth=0.0)
+        artist.disks.set(array=moved[2, disk] / turn, cmap="RdBu_r", norm=Normalize(-1, 1))
+        axes.quiver(*artist.view.place.T, *(reach * moved[:2, disk]), width=0.007, **ARROWS)
     else:
-        moved = mode.at(0.0)
         turns = np.linalg.norm(moved[3:] / (np.linalg.norm(moved[3:], axis=0).max() or 1.0), axis=0)[:, None]
         faces = (1 - turns) * np.array(to_rgb(TURNS[0])) + turns * np.array(to_rgb(TURNS[1]))
         draw_spheres(axes, packing.configuration, {}, 0.0, faces)
         order = np.argsort(-(packing.position @ INTO))
-        arrow = _arrow_scale(packing, mode) * flat(moved[:3].T)
+        arrow = reach * flat(moved[:3].T)
         axes.quiver(*flat(packing.position)[order].T, *arrow[order].T, width=0.008, **ARROWS)
     axes.set_title(title, fontsize=7)
 
@@ -264,15 +212,13 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str
         A complex mode of disks also a quarter of a period later.
     """
     spheres = packing.dimension == 3
-    later = [mode.is_complex and not spheres for mode in modes]
-    panels = [
-        (mode, phase) for mode, twice in zip(modes, later, strict=True) for phase in (0.0, np.pi / 2)[: 1 + twice]
-    ]
+    phases = [(0.0, np.pi / 2) if mode.is_complex and not spheres else (0.0,) for mode in modes]
+    panels = [(mode, phase) for mode, moments in zip(modes, phases, strict=True) for phase in moments]
     figure, axes, points = figure_for(packing, len(panels), below=0.95)
     for one, (mode, phase) in zip(axes, panels, strict=True):
         _show_mode(one, packing, mode, phase, points)
     moments = ", at the largest displacement" if spheres else ", at two moments a quarter of a period apart"
-    finish(axes, packing, words + moments if spheres or any(later) else words)
+    finish(axes, packing, words + moments if spheres or len(panels) > len(modes) else words)
     return figure
 
 

@@ -14,12 +14,9 @@ from ..analysis.uncertain_digits import with_uncertainty
 PROSE_WIDTH = 118
 """Characters of a line of prose."""
 
-LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
-"""Beginnings of lines that are no prose: tables, headings, tags, formulas, pictures, code."""
-
-
-ITEM = re.compile(r"- |\d+\. ")
-"""The beginning of an item of a list."""
+PROSE = r"(?![|#<$!]|```| {4}|\s*$)"
+PARAGRAPH = re.compile(rf"^{PROSE}(- |\d+\. )?.+\n?(?:{PROSE}(?!- |\d+\. ).+\n?)*", re.MULTILINE)
+"""Lines of prose, or of an item of a list: no tables, headings, tags, formulas, pictures, code."""
 
 NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
 """The blank before a word that would make a list, a quotation or a heading of the line that begins with it."""
@@ -68,28 +65,14 @@ def _text(package: str, name: str, numbers: dict[str, Any]) -> str:
 
 def fill_paragraphs(text: str) -> str:
     """A page whose paragraphs are as wide as a screen at the most; blocks of code and formulas stay as they are."""
+
+    def fill(found: re.Match[str]) -> str:
+        mark = found[1] or ""
+        words = NO_BEGINNING.sub("\0", " ".join(found[0][len(mark) :].split()))
+        lines = textwrap.fill(words, PROSE_WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark),
+                              break_long_words=False, break_on_hyphens=False)  # fmt: skip
+        return lines.replace("\0", " ") + "\n" * found[0].endswith("\n")
+
     parts = re.split(r"^((?:```|\$\$).*?^(?:```|\$\$)$)", text, flags=re.MULTILINE | re.DOTALL)
-    parts[::2] = map(_fold_paragraphs, parts[::2])
+    parts[::2] = [PARAGRAPH.sub(fill, part) for part in parts[::2]]
     return "".join(parts)
-
-
-def _fold_paragraphs(text: str) -> str:
-    """Paragraphs and items of lists folded anew; an item's lines are indented."""
-    done: list[str] = []
-    open_paragraph = False
-    for line in text.split("\n"):
-        prose = bool(line.strip()) and not LAID_OUT.match(line)
-        if open_paragraph and prose and not ITEM.match(line):
-            done[-1] += " " + line.strip()
-        else:
-            done.append(line)
-        open_paragraph = prose
-    return "\n".join(line if LAID_OUT.match(line) else _wrap_lines(line) for line in done)
-
-
-def _wrap_lines(line: str) -> str:
-    item = ITEM.match(line)
-    mark = item.end() if item else 0
-    bound, indent = line[:mark].replace(" ", "\0") + NO_BEGINNING.sub("\0", line[mark:]), " " * mark
-    lines = textwrap.wrap(bound, PROSE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-    return "\n".join(lines).replace("\0", " ")

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -18,10 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from faultgouge.analysis import Onset, pair_eigenvalues
 from faultgouge.analysis.arrays import Floats
 
-from .style import INK, styled
-
-INSET_POINTS = 8
-"""Loads beyond the onset that the inset shows."""
+from .style import styled
 
 LOADS_BETWEEN = 10
 """Points of a curve between two loads: closer to each other at the ends, where a square root is steep."""
@@ -30,9 +26,7 @@ DOTTED_LOADS = 100
 """Loads up to which dots show the computed eigenvalues."""
 
 
-def curve_through(
-    load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float | None = None
-) -> tuple[Floats, NDArray[np.complex128]]:
+def curve_through(load: Floats, eigenvalues: NDArray[np.complex128]) -> tuple[Floats, NDArray[np.complex128]]:
     """The curve of a pair of eigenvalues through its stored loads.
 
     The interpolation keeps to the shape of the numbers (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 238 (1980)): D
@@ -44,8 +38,6 @@ def curve_through(
         Stored loads, strictly increasing or strictly decreasing.
     eigenvalues : ndarray of complex, shape (n, 2)
         Both members, two real numbers or two complex conjugates; nan where the pair is unknown.
-    coalescence : float, optional
-        A load at which the two are known to coalesce; it counts if D changes its sign between the loads around it.
 
     Returns
     -------
@@ -57,27 +49,19 @@ def curve_through(
     """
     known = np.isfinite(eigenvalues).all(axis=1)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
-    parts = [_curve(load[a:b], eigenvalues[a:b], coalescence) for a, b in ends.reshape(-1, 2)]
+    parts = [_curve(load[a:b], eigenvalues[a:b]) for a, b in ends.reshape(-1, 2)]
     gap = np.full((1, 3), complex(np.nan, np.nan))
     joined = np.concatenate([gap[:0], *(row for part in parts for row in (part, gap))])[:-1]
     return joined[:, 0].real, joined[:, 1:]
 
 
-def _curve(load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float | None) -> NDArray[np.complex128]:
+def _curve(load: Floats, eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Rows of a load and two eigenvalues along one stretch of known loads, with loads that crowd at the roots of D."""
-    falls = load[-1] < load[0]
-    if falls:
-        load, eigenvalues = load[::-1], eigenvalues[::-1]
+    order = slice(None, None, -1 if load[-1] < load[0] else 1)
+    load, eigenvalues = load[order], eigenvalues[order]
     mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
     if len(load) > 1:
-        mean_at = PchipInterpolator(load, mean)
-        if coalescence is not None and load[0] < coalescence < load[-1]:
-            k = int(np.searchsorted(load, coalescence))
-            if load[k] == coalescence:
-                square = np.where(load == coalescence, 0.0, square)
-            elif square[k - 1] * square[k] < 0:
-                load, square = np.insert(load, k, coalescence), np.insert(square, k, 0.0)
-        square_at = PchipInterpolator(load, square)
+        mean_at, square_at = PchipInterpolator(load, mean), PchipInterpolator(load, square)
         roots = square_at.roots(extrapolate=False)
         roots = roots[np.isfinite(roots)]
         knots = np.union1d(load, roots)
@@ -88,8 +72,7 @@ def _curve(load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float
         mean, square = mean_at(load), np.where(np.isin(load, roots), 0.0, square_at(load))
     root = 0.5 * np.sqrt(square.astype(np.complex128))
     below = np.where(square > 0, -root, root)
-    rows = np.column_stack([load, mean + below, mean - below])
-    return rows[::-1] if falls else rows
+    return np.column_stack([load, mean + below, mean - below])[order]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +126,7 @@ class PairCurve:
 
     def smooth(self) -> "PairCurve":
         """The same pair with many points between its loads, see :func:`curve_through`."""
-        load, eigenvalues = curve_through(self.fx, self.eigenvalues, self.fx_c)
+        load, eigenvalues = curve_through(self.fx, self.eigenvalues)
         return PairCurve(self.mu, load, eigenvalues, self.fx_c)
 
 
@@ -154,7 +137,7 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
     Parameters
     ----------
     curves : sequence of PairCurve
-        One curve for each friction coefficient. The inset shows the first curve around its onset, if there is one.
+        One curve for each friction coefficient.
 
     Returns
     -------
@@ -176,7 +159,7 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
         if curve.fx_c is not None:
             for panel in (real, imaginary):
                 panel.axvline(curve.fx_c, color=colour, linewidth=0.6, linestyle=":")
-    real.set_ylim(_limits(curves))
+    real.margins(y=0.1)
     real.legend(loc="best")
     real.set_ylabel(r"$\mathrm{Re}\,\lambda$")
     imaginary.set_ylabel(r"$\mathrm{Im}\,\lambda$")
@@ -185,40 +168,4 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
         panel.set_xlim(min(curve.fx[0] for curve in curves), max(curve.fx[-1] for curve in curves))
         panel.set_title(name, loc="left", fontsize=8.5, pad=3)
     imaginary.margins(y=0.1)
-    if curves[0].fx_c is not None:
-        _magnify_onset(imaginary, curves[0], curves[0].fx_c)
     return figure
-
-
-def _limits(curves: Sequence[PairCurve]) -> tuple[float, float] | tuple[None, None]:
-    """Range of the real parts up to the ends of the windows; real parts beyond the windows may lie outside."""
-    shown = [
-        curve.real[(curve.fx <= (np.inf if curve.fx_c is None else curve.fx_c)) | (curve.imaginary[:, 1] > 0)]
-        for curve in curves
-    ]
-    values = np.concatenate([each.ravel() for each in shown])
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return None, None
-    margin = 0.1 * (np.ptp(values) or 1.0)
-    return float(values.min() - margin), float(values.max() + margin)
-
-
-def _magnify_onset(axes: Axes, curve: PairCurve, fx_c: float) -> None:
-    """Inset with the imaginary parts about the onset, counted from it in a power of ten."""
-    beyond = curve.fx[curve.fx > fx_c][:INSET_POINTS]
-    if not len(beyond):
-        return
-    reach = beyond[-1] - fx_c
-    power = int(np.floor(np.log10(reach)))
-    inset = axes.inset_axes((0.13, 0.66, 0.36, 0.31))
-    for shown, style in ((curve.smooth(), "-"), (curve, "o")):
-        near = np.abs(shown.fx - fx_c) <= 1.05 * reach
-        from_onset = (shown.fx[near] - fx_c) / 10.0**power
-        inset.plot(from_onset, shown.imaginary[near], style, color=to_hex("C0"), markersize=2, linewidth=0.7)
-    inset.axvline(0, color=INK, linewidth=0.6, linestyle=":")
-    inset.set_xlim(-1.05 * reach / 10.0**power, 1.05 * reach / 10.0**power)
-    inset.locator_params(nbins=4)
-    inset.tick_params(labelsize=6.5, pad=2)
-    inset.set_xlabel(rf"$(F_x - F_x^c)\,/\,10^{{{power}}}$", fontsize=7, labelpad=1)
-    inset.set_ylabel(r"$\mathrm{Im}\,\lambda$", fontsize=7, labelpad=1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import ElasticModuli, Growth, Packing, PlaneWave, Vibrations
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.responses.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 from faultgouge.analysis.responses.slips import Slip
 
 from .style import EDGE, FLOOR, INK, MOBILIZATION, figure_of, styled
@@ -98,25 +99,25 @@ def draw_growth(time: Floats, msd: Floats, rate: float | None, fitted: Growth | 
 
 def _slope(time: Floats, msd: Floats, rate: float, fitted: Growth | None) -> tuple[Floats, Floats]:
     """Times and values of the two ends of the predicted slope."""
-    above = msd > 0
     if fitted is not None:
-        ends = np.array([fitted.start, fitted.end])
-        inside = above & (time >= ends[0]) & (time <= ends[1])
-        intercept = np.mean(np.log(msd[inside]) - rate * time[inside])
-    else:
-        noise = np.median(msd[above & (time <= time[0] + 0.25 * (time[-1] - time[0]))])
-        room = np.log(10**SHIFT * msd.max() / noise) / rate  # to where the picture would end without the slope
-        ends = np.array([time[0], min(time[-1], time[0] + room)])
-        intercept = np.log(noise) - rate * time[0]
-    return ends, 10**SHIFT * np.exp(intercept + rate * ends)
+        ends, inside = np.array([fitted.start, fitted.end]), (msd > 0) & (time >= fitted.start) & (time <= fitted.end)
+        return ends, 10**SHIFT * np.exp(np.mean(np.log(msd[inside]) - rate * time[inside]) + rate * ends)
+    noise = _noise(*positive(time, msd, log_x=False))
+    room = np.log(10**SHIFT * msd.max() / noise) / rate  # to where the picture would end without the slope
+    ends = np.array([time[0], min(time[-1], time[0] + room)])
+    return ends, 10**SHIFT * noise * np.exp(rate * (ends - time[0]))
+
+
+def _noise(time: Floats, values: Floats) -> float:
+    """The median of the first quarter."""
+    return float(np.median(values[time <= time[0] + 0.25 * (time[-1] - time[0])]))
 
 
 def begin_at_noise(axes: Axes, time: ArrayLike, values: ArrayLike) -> None:
     """The lower end of the axis of a quantity that grows, see `BELOW_NOISE`."""
     time, values = positive(time, values, log_x=False)
     if len(time):
-        noise = values[time <= time[0] + 0.25 * (time[-1] - time[0])]
-        axes.set_ylim(bottom=BELOW_NOISE * float(np.median(noise)))
+        axes.set_ylim(bottom=BELOW_NOISE * _noise(time, values))
 
 
 def positive(x: ArrayLike, y: ArrayLike, log_x: bool = True) -> tuple[Floats, Floats]:
@@ -131,12 +132,6 @@ def few_decades(axes: Axes, count: int = 7) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "log":
             axis.set_major_locator(LogLocator(numticks=count))
-
-
-def scientific(value: float) -> str:
-    """1.2 x 10^-3 for mathtext."""
-    exponent = int(np.floor(np.log10(value)))
-    return rf"{value / 10.0**exponent:.1f} \times 10^{{{exponent}}}"
 
 
 @styled
@@ -162,11 +157,6 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     axes.set(xlabel=label, ylabel="$F_x$")
     axes.margins(0.08)
     axes.legend(title="$F_x$", fontsize=7, title_fontsize=7)
-    left = hysteresis(packings)
-    if left is not None:
-        words = f"remains: {_format_signed(left.remaining)}, work: {_format_signed(left.work)}"
-        says = "the path closes, to rounding" if left.closes else words
-        axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
     return figure_of(axes)
 
 
@@ -175,10 +165,6 @@ def in_powers_of_ten(moved: Floats) -> tuple[Floats, str]:
     power = int(np.floor(np.log10(np.abs(moved).max() or 1.0)))
     unit = rf" $/\,10^{{{power}}}$" if power else ""
     return moved / 10.0**power, f"displacement of the upper layer{unit}"
-
-
-def _format_signed(value: float) -> str:
-    return "0" if value == 0 else f"${'-' if value < 0 else ''}{scientific(abs(value))}$"
 
 
 @styled
@@ -229,32 +215,29 @@ def draw_vibrations(found: Vibrations) -> Figure:
     found : Vibrations
         Of all modes, each of which is a dot, or of random vectors.
     """
-    figure = Figure(figsize=(3.5, 5.6 if np.any(found.damping > 0) else 4.2), layout="constrained")
-    rows = figure.subplots(3 if np.any(found.damping > 0) else 2, sharex=True)
-    density, share = rows[0], rows[1]
-    density.fill_between(
-        found.frequency, found.density - found.density_error, found.density + found.density_error,
-        color=EDGE, linewidth=0, alpha=0.5,
-    )  # fmt: skip
+    damped = bool(np.any(found.damping > 0))
+    figure = Figure(figsize=(3.5, 5.6 if damped else 4.2), layout="constrained")
+    density, share, *more = figure.subplots(3 if damped else 2, sharex=True)
+    low, high = found.density - found.density_error, found.density + found.density_error
+    density.fill_between(found.frequency, low, high, color=EDGE, linewidth=0, alpha=0.5)
     density.plot(found.frequency, found.density, color=INK, linewidth=0.9)
     density.set(ylabel=r"density of states $g(\omega)$", ylim=(0, None), xlim=(0, found.largest))
-    width = found.resolution[0]
-    density.plot([0.03 * found.largest, 0.03 * found.largest + width], [0.92, 0.92], color=FLOOR, linewidth=1.5,
-                 transform=density.get_xaxis_transform())  # fmt: skip
-    density.text(0.03 * found.largest + 1.5 * width, 0.92, "window", va="center", fontsize=6, color=FLOOR,
-                 transform=density.get_xaxis_transform())  # fmt: skip
-    if found.modes is not None:
-        share.plot(found.modes["frequency"], found.modes["participation"], ".", color=INK, markersize=2)
+    begin, across = 0.03 * found.largest, density.get_xaxis_transform()
+    end = begin + found.resolution[0]
+    density.plot([begin, end], [0.92, 0.92], color=FLOOR, linewidth=1.5, transform=across)
+    density.text(end + 0.5 * (end - begin), 0.92, "window", va="center", fontsize=6, color=FLOOR, transform=across)
     share.plot(found.frequency, found.rotation, color=SHARE_COLOUR, linewidth=0.9)
-    says = "participation (dots), rotation (line)" if found.modes is not None else "share of rotation"
-    share.set(ylabel=says, ylim=(0, 1))
-    if len(rows) == 3:
-        if found.modes is not None:
-            quality = found.modes["frequency"] / np.maximum(found.modes["damping"], np.finfo(float).tiny)
-            rows[2].plot(found.modes["frequency"], quality, ".", color=INK, markersize=2)
-        rows[2].plot(found.frequency, found.quality, color=SHARE_COLOUR, linewidth=0.9)
-        rows[2].set(ylabel="quality factor $Q$", yscale="log")
-    rows[-1].set_xlabel(r"$\omega$")
+    share.set(ylabel="share of rotation", ylim=(0, 1), xlabel="" if damped else r"$\omega$")
+    for axes in more:
+        axes.plot(found.frequency, found.quality, color=SHARE_COLOUR, linewidth=0.9)
+        axes.set(ylabel="quality factor $Q$", yscale="log", xlabel=r"$\omega$")
+    if found.modes is not None:
+        frequency, tiny = found.modes["frequency"], np.finfo(float).tiny
+        share.plot(frequency, found.modes["participation"], ".", color=INK, markersize=2, zorder=1)
+        share.set(ylabel="participation (dots), rotation (line)")
+        for axes in more:
+            quality = frequency / np.maximum(found.modes["damping"], tiny)
+            axes.plot(frequency, quality, ".", color=INK, markersize=2, zorder=1)
     return figure
 
 
@@ -274,17 +257,17 @@ def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) 
     most = max(wave.wave_number for wave in waves)
     names = ("longitudinal", "transverse", "transverse, the other")
     for kind in sorted({wave.polarisation for wave in waves}):
-        these = [wave for wave in waves if wave.polarisation == kind]
-        colour, mark = (INK if kind == 0 else SHARE_COLOUR), "os^"[kind]
-        number = [wave.wave_number for wave in these]
-        above.plot(number, [wave.frequency for wave in these], mark, color=colour, markersize=3.5, label=names[kind])
-        below.plot(number, [wave.attenuation for wave in these], mark, color=colour, markersize=3.5)
+        these = [(wave.wave_number, wave.frequency, wave.attenuation) for wave in waves if wave.polarisation == kind]
+        number, frequency, attenuation = zip(*these, strict=True)
+        style: dict[str, Any] = {"color": SHARE_COLOUR if kind else INK, "marker": "os^"[kind], "linestyle": ""}
+        above.plot(number, frequency, markersize=3.5, label=names[kind], **style)
+        below.plot(number, attenuation, markersize=3.5, **style)
     if moduli is not None:
         lame = moduli.bulk - 2 * moduli.shear / moduli.dimension
         speeds = np.sqrt(np.array([lame + 2 * moduli.shear, moduli.shear]) / moduli.density)
         for speed, shade, name in zip(speeds, (INK, SHARE_COLOUR), ("P", "S"), strict=True):
-            above.plot([0, most], [0, speed * most], color=shade, linewidth=0.7, linestyle="--",
-                       label=f"{name}, elastic moduli")  # fmt: skip
+            line = {"color": shade, "linewidth": 0.7, "linestyle": "--", "label": f"{name}, elastic moduli"}
+            above.plot([0, most], [0, speed * most], **line)
     above.set(ylabel=r"frequency $\omega$", ylim=(0, None))
     above.legend(fontsize=6)
     below.set(xlabel="wave number $q$", ylabel=r"attenuation $\gamma$", xlim=(0, 1.05 * most))

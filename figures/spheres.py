@@ -18,7 +18,7 @@ from matplotlib.colors import to_rgb
 from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats
 
-from .disk_view import walls_of
+from .disk_view import cut
 from .style import BULK, EDGE, FLOOR
 
 AZIMUTH, ELEVATION = np.radians([-62.0, 16.0])
@@ -39,8 +39,8 @@ DOTS_ACROSS = 900
 FAR_OPACITY = 0.25
 """Opacity of the bars farthest from the eye."""
 
-ROOM_AROUND = 0.25
-"""Room around the spheres, in units of the largest radius, for bars that leave a periodic box."""
+ENDS = np.array(list(product((0, 1), repeat=3)))
+"""Corners of a cube."""
 
 AxesLimits = tuple[float, float, float, float]
 
@@ -50,26 +50,22 @@ def flat(place: Floats) -> Floats:
     return np.stack([place @ RIGHT, place @ UP], axis=-1)
 
 
-def _corners_of(configuration: Configuration) -> tuple[Floats, Floats]:
+def corners_of(configuration: Configuration) -> tuple[Floats, Floats]:
     """Lower and upper corner of the picture: the box along periodic axes, walls and spheres along the others."""
-    reach = configuration.radius[:, None]
-    low, high = (configuration.position - reach).min(axis=0), (configuration.position + reach).max(axis=0)
-    lengths = np.diag(configuration.box)
-    across = configuration.periodic & ~(configuration.box - np.diag(lengths)).any(axis=1)
-    low = np.where(across, configuration.origin, low)
-    high = np.where(across, configuration.origin + lengths, high)
-    for wall in walls_of(configuration):
-        wall.cut(low, high)
-    return low, high
+    c, reach, lengths = configuration, configuration.radius[:, None], np.diag(configuration.box)
+    along = c.periodic & ~(c.box - np.diag(lengths)).any(axis=1)
+    low = np.where(along, c.origin, (c.position - reach).min(axis=0))
+    high = np.where(along, c.origin + lengths, (c.position + reach).max(axis=0))
+    return cut(c.planes, low, high)
 
 
 def frame_of(configuration: Configuration) -> AxesLimits:
-    """Edges of the picture: left, right, bottom, top."""
-    corners = flat(np.array(list(product(*zip(*_corners_of(configuration), strict=True)))))
+    """Edges of the picture: left, right, bottom, top; with room for bars that leave a periodic box."""
+    low, high = corners_of(configuration)
     place, reach = flat(configuration.position), configuration.radius[:, None]
-    low, high = (np.concatenate([corners, place + sign * reach]) for sign in (-1, 1))
-    room = ROOM_AROUND * configuration.radius.max()
-    (left, bottom), (right, top) = low.min(axis=0) - room, high.max(axis=0) + room
+    around = np.concatenate([flat(low + ENDS * (high - low)), place - reach, place + reach])
+    room = 0.25 * configuration.radius.max()
+    (left, bottom), (right, top) = around.min(axis=0) - room, around.max(axis=0) + room
     return float(left), float(right), float(bottom), float(top)
 
 
@@ -114,13 +110,12 @@ def draw_spheres(
     LineCollection
         The bars, from back to front.
     """
-    c, (low, high) = configuration.contacts, _corners_of(configuration)
+    c, (low, high) = configuration.contacts, corners_of(configuration)
     frame = left, right, bottom, top = frame_of(configuration)
     axes.set(aspect="equal", xlim=(left, right), ylim=(bottom, top))
     axes.set_axis_off()
-    ends = np.array(list(product((0, 1), repeat=3)))
-    for axis, sign, _ in walls_of(configuration):
-        side = [end for end in ends if end[axis] == (sign < 0)]
+    for axis, sign, _ in configuration.planes:
+        side = [end for end in ENDS if end[axis] == (sign < 0)]
         ring = low + np.array([side[k] for k in (0, 2, 3, 1)]) * (high - low)
         behind = sign * INTO[axis] < 0  # its inner face is turned to the eye
         face: Any = (*to_rgb(FLOOR), 0.55 if axis == 2 else 0.2) if behind else "none"
@@ -128,7 +123,7 @@ def draw_spheres(
         wall.set_zorder(0 if behind else 4)
         axes.add_collection(wall)
     if configuration.periodic.any():
-        pairs = [(a, b) for a in ends for b in ends if (b - a).sum() == 1 and (b >= a).all()]
+        pairs = [(a, b) for a in ENDS for b in ENDS if (b - a).sum() == 1 and (b >= a).all()]
         lines = [flat(low + np.array(pair) * (high - low)) for pair in pairs]
         axes.add_collection(LineCollection(lines, colors=EDGE, linewidths=0.6, linestyles=(0, (3, 3)), zorder=0.5))
     if faces is None:

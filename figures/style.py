@@ -14,7 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from faultgouge.analysis import BadInputError
-from faultgouge.analysis.files.atomic_write import replace_whole
+from faultgouge.analysis.files.atomic_write import MARK, replace_whole
 
 STYLE = str(files(__package__) / "faultgouge.mplstyle")
 
@@ -81,6 +81,6 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 @styled
 def save_as(figure: Figure, path: Path) -> None:
     """Write a figure in the format that its name ends in: png, svg or pdf; the same bytes for the same figure."""
-    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    about = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {"Comment": MARK}}
     with replace_whole(path) as new:
-        figure.savefig(new, metadata=dates.get(path.suffix.lower()))
+        figure.savefig(new, metadata=about.get(path.suffix.lower()))

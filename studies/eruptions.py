@@ -34,8 +34,7 @@ from threadpoolctl import threadpool_limits
 from ..analysis import NoEquilibriumError, Packing, mean_square_displacement, nearest_image, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.counted import counted
-from ..analysis.responses.growth import NOISE_FACTOR
-from ..analysis.responses.growth_of_run import unstable_rates
+from ..analysis.responses.growth import NOISE_FACTOR, unstable_rates
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step

@@ -6,9 +6,9 @@ triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.responses.forcing`),
-transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
-wave nearly all of v is such free motion.
+where T is the duration of the wave. v(t) follows from K, C and M alone
+(:mod:`~faultgouge.analysis.responses.response`), transient included: without dissipation the motion excited by the
+beginning of the wave never decays, and for a slow wave nearly all of v is such free motion.
 
 In LAMMPS, the same wave triggers or does not; a bisection finds the critical amplitude. These runs use nothing of the
 linear theory. The wave is a force on each disk of the upper layer, or an acceleration of the floor.
@@ -30,8 +30,7 @@ from threadpoolctl import threadpool_limits
 
 from ..analysis import Packing, find_onset, spectrum
 from ..analysis.arrays import Floats
-from ..analysis.responses.forcing import floor_force, impulse_response
-from ..analysis.responses.response import layer_force
+from ..analysis.responses.response import floor_force, impulse_response, layer_force
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
 from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads

@@ -46,10 +46,9 @@ from mpi4py import MPI
 from ..analysis import FaultgougeError, Growth, Onset, Packing, fit_growth, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
-from ..analysis.responses.growth_of_run import JUMP_SHARE, LINEAR_RANGE
+from ..analysis.responses.growth import JUMP_SHARE, LINEAR_RANGE, PowerLaw, fit_power_law
 from ..analysis.responses.normal_form import LEAST_CROSSOVER, NormalForm
-from ..analysis.responses.power_law import PowerLaw, fit_power_law
-from ..analysis.responses.response import LinearMotion
+from ..analysis.responses.response import linear_response
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening
@@ -297,7 +296,7 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
     weak = replace(packing, law=replace(packing.law, mu=mu))
     times = time * np.arange(1, FORECAST_TIMES + 1) / FORECAST_TIMES
     with np.errstate(over="ignore"):
-        msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
+        msd = linear_response(weak, times, force=weak.net_force - packing.net_force).msd
     msd = np.fmin(msd, np.finfo(float).max)
     first = float(msd[times <= (JUMP_SHARE * time if window is None else window)].max(initial=msd[0]))
     room = (LINEAR_RANGE * packing.smallest_overlap) ** 2 / first

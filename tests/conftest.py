@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 from reference_layer import BIN, REFERENCE, on_ranks
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 gc.disable()  # until the tests are found: a fifth of that time went into the search for garbage among what is imported
+
+settings.register_profile("no_deadline", deadline=None)  # of a busy machine an example takes any time
+settings.load_profile("no_deadline")
 
 LIMIT = 1800
 """Seconds for one command on a busy machine."""

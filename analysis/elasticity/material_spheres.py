@@ -14,7 +14,6 @@ A restitution coefficient e makes dashpots :math:`c = 2 \sqrt{5/6}\, \beta \sqrt
 Where contacts are not given, those are taken that overlap, with tangential forces that are not known.
 """
 
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +24,7 @@ from ..configuration import UNKNOWN_SLIPS, Configuration
 from ..contacts import LinearisedContacts
 from ..errors import BadInputError
 from ..motion.stable_timestep import StableTimestep, rayleigh_timestep, stable_timestep
+from ..operators.gaps import near_pairs
 
 
 class Material(NamedTuple):
@@ -91,30 +91,6 @@ class Material(NamedTuple):
 TINY = np.finfo(float).tiny
 
 
-def touching_spheres(
-    position: Floats, radius: Floats, box: Floats, periodic: ArrayLike
-) -> tuple[Indices, Indices, Floats]:
-    """Pairs of spheres that overlap, through the sides of the box, too: i, j, and the branch vectors towards i, (C, 3).
-
-    A sphere that overlaps two images of another one has two contacts.
-    """
-    from scipy.spatial import cKDTree
-
-    tree, found = cKDTree(position), []
-    low, high = position.min(axis=0) - 2 * radius.max(), position.max(axis=0) + 2 * radius.max()
-    for image in product(*((-1, 0, 1) if each else (0,) for each in np.asarray(periodic))):
-        shifted = position + np.array(image) @ box
-        inside = np.flatnonzero(np.all((shifted >= low) & (shifted <= high), axis=1))
-        near = tree.query_ball_point(shifted[inside], radius[inside] + radius.max())
-        j = np.repeat(inside, [len(each) for each in near])
-        i = np.concatenate([np.zeros(0, int), *(np.array(each, int) for each in near)])
-        branch = position[i] - shifted[j]
-        once = (i < j) & (np.linalg.norm(branch, axis=1) < radius[i] + radius[j])
-        found.append((i[once], j[once], branch[once]))
-    i, j, branch = (np.concatenate(each) for each in zip(*found, strict=True))
-    return i, j, branch
-
-
 def spheres_of_material(
     position: ArrayLike,
     radius: ArrayLike,
@@ -168,7 +144,7 @@ def spheres_of_material(
         origin = (place - radius[:, None]).min(axis=0)
         box = np.diag((place + radius[:, None]).max(axis=0) - origin)
     box = np.asarray(box, float)
-    i, j, branch = touching_spheres(place, radius, box, periodic) if contacts is None else contacts
+    i, j, branch = near_pairs(place, radius, box, periodic) if contacts is None else contacts
     distance = np.linalg.norm(branch, axis=1)
     if not distance.all():
         k = int(np.argmin(distance))

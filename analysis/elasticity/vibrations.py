@@ -136,8 +136,8 @@ def vibrations(packing: HasConfiguration, moments: int | None = None, vectors: i
         raise BadInputError("Nothing vibrates: no particle touches another.")
     moments = moments or min(MOMENTS, max(64, configuration.coordinates // 8))
     if configuration.coordinates <= ALL_MODES:
-        return _of_all_modes(configuration, weighted[0], weighted[1], moments)
-    return _of_vectors(configuration, weighted[0], weighted[1], moments, vectors)
+        return _of_all_modes(configuration, *weighted, moments)
+    return _of_vectors(configuration, *weighted, moments, vectors)
 
 
 def _of_all_modes(c: Configuration, a: csr_array, g: csr_array, moments: int) -> Vibrations:
@@ -226,40 +226,34 @@ def softness(packing: HasConfiguration) -> tuple[Floats, Floats]:
         standard error beyond.
     """
     c = packing.configuration
-    response, d, n = QuietResponse(c), c.dimension, len(c)
+    response, d, n, rng = QuietResponse(c), c.dimension, len(c), np.random.default_rng(0)
     translations = np.flatnonzero(np.diff(response.matrix.indptr)[: d * n])
     exact = len(translations) <= EXACT_SOFTNESS
     floats = not c.contacts.wall.any() and bool(c.free.all())
-    found = np.zeros((2, d * n))
-    batches = np.array_split(np.arange(len(translations) if exact else PROBES), max(1, len(translations) // 64)
-                             if exact else 4)  # fmt: skip
-    rng = np.random.default_rng(0)
+    found, probes = np.zeros((2, d * n)), len(translations) if exact else PROBES
+    batches = np.array_split(np.arange(probes), max(1, probes // 64) if exact else 4)
+
+    def without_mean(vectors: Floats) -> Floats:
+        """The box as a whole has nothing to hold it: forces and displacements are those without their mean."""
+        parts = vectors.reshape(d, n, -1)
+        return np.asarray(parts - floats * parts.mean(axis=1, keepdims=True)).reshape(d * n, -1)
+
     for done, batch in enumerate(batches):
-        force = np.zeros((c.coordinates, len(batch)))
+        drives = np.zeros((c.coordinates, len(batch)))
         if exact:
-            force[translations[batch], np.arange(len(batch))] = 1.0
+            drives[translations[batch], np.arange(len(batch))] = 1.0
         else:
-            force[translations] = rng.choice([-1.0, 1.0], size=(len(translations), len(batch)))
-        drives = force.copy()
-        if floats:  # the box as a whole has nothing to hold it: forces are those without their mean
-            drives[: d * n] = _without_mean(drives, d, n)
-        moved = np.real(response.solve(drives, 1)[: d * n])
-        values = force[: d * n] * (_without_mean(moved, d, n) if floats else moved)
+            drives[translations] = rng.choice([-1.0, 1.0], size=(len(translations), len(batch)))
+        force = drives[: d * n].copy()
+        drives[: d * n] = without_mean(force)
+        values = force * without_mean(np.real(response.solve(drives, 1)[: d * n]))
         found += [values.sum(axis=1), (values**2).sum(axis=1)]
         report_progress(f"softness, {done + 1} of {len(batches)}")
-    if exact:
-        mean, spread = found[0], np.zeros(d * n)
-    else:
-        mean = found[0] / PROBES
-        spread = np.sqrt(np.maximum(found[1] / PROBES - mean**2, 0.0) / PROBES)
+    mean = found[0] if exact else found[0] / PROBES
+    spread = np.zeros(d * n) if exact else np.sqrt(np.maximum(found[1] / PROBES - mean**2, 0.0) / PROBES)
     soft, error = mean.reshape(d, n).mean(axis=0), np.linalg.norm(spread.reshape(d, n), axis=0) / d
     loose = (soft > 0.01 / (d * response.held)) | ~np.isin(np.arange(n), translations % n)
     return np.where(loose, np.inf, soft), np.where(loose, 0.0, error)
-
-
-def _without_mean(vectors: Floats, d: int, n: int) -> Floats:
-    parts = vectors[: d * n].reshape(d, n, -1)
-    return np.asarray(parts - parts.mean(axis=1, keepdims=True)).reshape(d * n, -1)
 
 
 class PlaneWave(NamedTuple):
@@ -302,44 +296,34 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
     directions = np.linalg.qr(np.column_stack([ahead, np.delete(np.eye(d), np.argmax(abs(ahead)), axis=1)]))[0]
     limit = WAVE_STEP * float(stable_timestep(c, stiffness))
     bears = (np.diff(stiffness.indptr) > 0)[: d * n].reshape(d, n).any(axis=0)
-    found = []
+    found, by_mass = [], 1 / mass[:, None]
     for number in range(1, waves + 1):
-        phase = c.position @ (number * reciprocal)
-        start = np.zeros((c.coordinates, 2 * d))
-        for k in range(d):
-            for which, shape in enumerate((np.cos(phase), np.sin(phase))):
-                start[: d * n, 2 * k + which] = np.outer(directions[:, k], shape * bears).ravel()
+        phase, start = c.position @ (number * reciprocal), np.zeros((c.coordinates, 2 * d))
+        for k, shape in np.ndindex(d, 2):
+            wave = (np.cos, np.sin)[shape](phase) * bears
+            start[: d * n, 2 * k + shape] = np.outer(directions[:, k], wave).ravel()
         size = np.einsum("ik,i,ik->k", start, mass, start)
-        rough = np.sqrt(np.einsum("ik,ik->k", start, stiffness @ start) / size).max()
+        rough = float(np.sqrt(np.einsum("ik,ik->k", start, stiffness @ start) / size).max())
         every = max(1, int(2 * np.pi / rough / WAVE_SAMPLES / limit))
-        samples = _followed(start, stiffness, damping, mass, limit, every, WAVE_PERIODS * WAVE_SAMPLES)
-        kept = np.asarray(np.mean((samples / size).reshape(-1, d, 2), axis=2), dtype=np.float64)
-        time = np.arange(len(kept), dtype=np.float64) * (every * limit)
+        # velocity Verlet; the velocity is that of the half step before
+        place, velocity, weighted = np.zeros_like(start), start.copy(), start * mass[:, None]
+        samples = [np.einsum("ik,ik->k", weighted, velocity)]
+        for step in range(1, every * (WAVE_PERIODS * WAVE_SAMPLES - 1) + 1):
+            force = stiffness @ place + (damping @ velocity if damping.nnz else 0.0)
+            half = velocity - (0.5 * limit) * by_mass * force
+            velocity = velocity - limit * by_mass * force
+            place += limit * velocity
+            if step % every == 0:
+                samples.append(np.einsum("ik,ik->k", weighted, half))
+        kept = np.mean((np.array(samples) / size).reshape(-1, d, 2), axis=2)
+        time = np.arange(len(kept)) * (every * limit)
         for k in range(d):
-            omega, gamma, misfit = _fit(time, np.ascontiguousarray(kept[:, k], dtype=np.float64), float(rough))
+            omega, gamma, misfit = _fit(time, np.ascontiguousarray(kept[:, k]), rough)
             # Verlet's own frequency of a motion is (2/dt) arcsin(omega dt/2)
             true = 2 / limit * np.sin(omega * limit / 2)
             found.append(PlaneWave(float(np.linalg.norm(number * reciprocal)), k, float(true), gamma, misfit))
         report_progress(f"plane waves, {number} of {waves}")
     return found
-
-
-def _followed(
-    start: Floats, stiffness: csr_array, damping: csr_array, mass: Floats, step: float, every: int, count: int
-) -> Floats:
-    """Projections of the velocities on the start, at every so many steps."""
-    by_mass, weighted = 1 / mass[:, None], start * mass[:, None]
-    damped = damping.nnz > 0
-    place, velocity = np.zeros_like(start), start.copy()  # the velocity is that of the half step before
-    samples = [np.einsum("ik,ik->k", weighted, velocity)]
-    for number in range(1, every * (count - 1) + 1):
-        force = stiffness @ place + (damping @ velocity if damped else 0.0)
-        half = velocity - (0.5 * step) * by_mass * force
-        velocity = velocity - step * by_mass * force
-        place += step * velocity
-        if number % every == 0:
-            samples.append(np.einsum("ik,ik->k", weighted, half))
-    return np.array(samples)
 
 
 def _fit(time: Floats, values: Floats, rough: float) -> tuple[float, float, float]:

@@ -1,7 +1,7 @@
 """Factors of matrices, for linear solvers: bands, and sparse factors of symmetric and of other matrices.
 
-`linear_solver` chooses for Newton's method, `sparse_lu` makes all sparse factors, `ldu` those of matrices with a
-symmetric pattern.
+`linear_solver` chooses for Newton's method, `sparse_lu` makes all sparse factors, `lanczos` finds eigenvectors slice by
+slice.
 
 May import: `packing`, `operators`.
 """

@@ -1,9 +1,9 @@
 // Copyright (C) 2026 The faultgouge developers
-// SPDX-License-Identifier: GPL-2.0-only
+// SPDX-License-Identifier: GPL-2.0-or-later
 //
-// This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
+// This file is free software under the terms of the GNU General Public License, version 2 or later; see LICENSE.
 
-// Factors L D U of a sparse matrix without pivoting, and solutions with them, see ldu.py. L and U^T have the pattern
+// Factors L D U of a sparse matrix without pivoting, and solutions with them, see sparse_lu.py. L and U^T have the pattern
 // that they would have if A had the entries of A + A^T.
 //
 // A symmetric matrix has one half, its lower one: U is L^T. Of any other matrix the transpose has the other half.

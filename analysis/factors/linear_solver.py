@@ -17,6 +17,7 @@ degree on the graph of disks and contacts. The coordinates of a disk stay togeth
 dense blocks.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -146,31 +147,6 @@ class BandSolver:
         return step if np.isfinite(solution.sum()) else None
 
 
-@dataclass(frozen=True, eq=False)
-class SparseFactors:
-    """Factors of K.
-
-    Attributes
-    ----------
-    coordinates : ndarray of int, shape (E,)
-        Which of the 3N coordinates the matrix has, in the order of elimination.
-    factors : Factors
-        Of the matrix in this order.
-    exact : bool
-        Whether they are of K itself, and not of its symmetric part.
-    """
-
-    coordinates: Indices
-    factors: Factors
-    exact: bool
-
-    def solve(self, force: Floats) -> Floats:
-        """The solution on these coordinates, zero on the others, shape (3N,)."""
-        step = np.zeros_like(force)
-        step[self.coordinates] = self.factors.solve(force[self.coordinates])
-        return step
-
-
 class SparseSolver:
     """K, solved with the factors of a matrix nearby as long as these serve, and then with its own.
 
@@ -190,66 +166,60 @@ class SparseSolver:
     """
 
     def __init__(self, matrix: csr_array, i: Indices, j: Indices, nearby: "SparseSolver | None" = None) -> None:
-        self._stiffness = matrix.diagonal()
+        self._stiffness, self._pairs, self.own = matrix.diagonal(), (i, j), False
         self._active = np.flatnonzero(self._stiffness)
         self._matrix = matrix[self._active][:, self._active]
-        self._pairs = i, j
-        self._factors: SparseFactors | None = None if nearby is None else nearby._factors
+        # factors, of which coordinates they are, and whether of K itself and not of its symmetric part
+        self._made: tuple[Factors, Indices, bool] | None = None if nearby is None else nearby._made
         self._left = [False, True]  # of which matrix factors can still be made: K, its symmetric part
-        self.own = False
 
     def solve(self, force: Floats) -> Floats | None:
         """The solution of K dq = F, shape (3N,); None if K is singular."""
-        step = self._solve_with_factors(force)
-        while step is None and self._left:
-            self._factors = None  # before the memory for others is taken
-            self._factors, self.own = self._factor(symmetric=self._left.pop()), True
-            step = self._solve_with_factors(force)
+        while True:
+            if self._made is not None:
+                step = self._with_factors(force) if self.own and self._made[2] else self._iterated(force)
+                if step is not None and np.all(np.isfinite(step)):
+                    return step
+            if not self._left:
+                return None
+            symmetric, self._made = self._left.pop(), None  # before the memory for others is taken
+            order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
+            matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
+            inside, self.own = csc_array(matrix[order][:, order]), True
+            with suppress(SingularMatrixError):
+                # nearly symmetric: pivots of K itself on the diagonal where good
+                pivoting = 0.0 if symmetric else 0.01
+                factors = symmetric_lu(inside, ordered=True, symmetric=symmetric, pivoting=pivoting)
+                self._made = factors, self._active[order], not symmetric
+
+    def _with_factors(self, force: Floats) -> Floats:
+        """The solution on the coordinates of the factors, zero on the others, shape (3N,)."""
+        assert self._made is not None
+        factors, coordinates, _ = self._made
+        step = np.zeros_like(force)
+        step[coordinates] = factors.solve(force[coordinates])
         return step
 
-    def _solve_with_factors(self, force: Floats) -> Floats | None:
-        """The solution with the factors at hand; None without factors, or if they give no solution."""
-        if self._factors is None:
-            return None
-        exact = self.own and self._factors.exact
-        step = self._factors.solve(force) if exact else self._solve_iteratively(self._factors, force)
-        return step if step is not None and np.all(np.isfinite(step)) else None
-
-    def _factor(self, symmetric: bool) -> SparseFactors | None:
-        order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
-        matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
-        inside = csc_array(matrix[order][:, order])
-        try:
-            # nearly symmetric: pivots of K itself on the diagonal where good
-            factors = symmetric_lu(inside, ordered=True, symmetric=symmetric, pivoting=0.0 if symmetric else 0.01)
-        except SingularMatrixError:
-            return None
-        return SparseFactors(self._active[order], factors, exact=not symmetric)
-
-    def _solve_iteratively(self, nearby: SparseFactors, force: Floats) -> Floats | None:
+    def _iterated(self, force: Floats) -> Floats | None:
         """The solution by GMRES; None if that takes too long."""
-        active, shape = self._active, self._matrix.shape
-        known = np.zeros(len(force), dtype=bool)
-        known[nearby.coordinates] = True
-        new = active[~known[active]]
+        assert self._made is not None
+        active, new = self._active, np.setdiff1d(self._active, self._made[1])
 
         def apply_preconditioner(residual: Floats) -> Floats:
             spread = np.zeros_like(force)
             spread[active] = residual
-            step = nearby.solve(spread)
+            step = self._with_factors(spread)
             step[new] = spread[new] / self._stiffness[new]
             return step[active]
 
         # from the right, so that its residual is a force
         operator = LinearOperator(
-            shape, lambda residual: self._matrix @ apply_preconditioner(residual), dtype=np.float64
+            self._matrix.shape, lambda residual: self._matrix @ apply_preconditioner(residual), dtype=np.float64
         )
         found, failed = gmres(operator, force[active], rtol=RESIDUAL_SHARE, restart=GMRES_ITERATIONS, maxiter=1)
-        if failed:
-            return None
         step = np.zeros_like(force)
         step[active] = apply_preconditioner(found)
-        return step
+        return None if failed else step
 
 
 def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) -> Indices:

@@ -28,7 +28,6 @@ import math
 import os
 import secrets
 import stat
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
@@ -40,9 +39,6 @@ from ..errors import OutputError, PackingFileError
 
 if TYPE_CHECKING:
     import h5py
-
-GZIP = b"\x1f\x8b"
-"""How a file begins that is compressed by gzip: LAMMPS compresses a dump whose name ends in .gz."""
 
 HEADER_SIZE = 512
 """Bytes of the header: the smallest user block of HDF5."""
@@ -62,47 +58,23 @@ OLD_DATA = b"# faultgouge sides="
 MARK_BYTES = 1 << 16
 """Bytes at the beginning and at the end of a file among which the mark is."""
 
-_COMMENT = f"{FORMAT_KEY}={FORMAT}".encode()
-_TEXT = b"tEXt" + b"Comment\0" + _COMMENT
+MARK = f"{FORMAT_KEY}={FORMAT}"
 TRAILERS = {
-    **dict.fromkeys((".md", ".html", ".svg", ".vtp", ".pvd"), b"<!-- " + _COMMENT + b" -->\n"),
-    ".pdf": b"%" + _COMMENT + b"\n",
-    ".gif": _COMMENT,  # behind the last block, where no reader looks
-    ".mp4": (8 + len(_COMMENT)).to_bytes(4, "big") + b"free" + _COMMENT,
-    ".png": (len(_TEXT) - 4).to_bytes(4, "big") + _TEXT + zlib.crc32(_TEXT).to_bytes(4, "big"),
+    **dict.fromkeys((".md", ".html", ".svg", ".vtp", ".pvd"), f"<!-- {MARK} -->\n".encode()),
+    ".pdf": f"%{MARK}\n".encode(),
+    ".gif": MARK.encode(),  # behind the last block, where no reader looks
+    ".mp4": (8 + len(MARK)).to_bytes(4, "big") + b"free" + MARK.encode(),
 }
-"""What ends a file of these formats, as a comment; of a PNG before its last chunk. The writers of JSON, extended XYZ,
-LAMMPS data and GSD give the number themselves."""
-
-END_OF_PNG = 12
-"""Bytes of the last chunk of a PNG."""
+"""What ends a file of these formats, as a comment. The writers of PNG, JSON, extended XYZ, LAMMPS data and GSD give the
+number themselves."""
 
 LONGEST_NAME = 200
 """Letters of a name that other names beside it begin with: file systems take 255 bytes."""
 
-BYTES_AT_A_TIME = 1 << 20
-"""Bytes that are read at a time, and by which a file grows in memory."""
-
-LIBVER = "v110", "v110"
-"""HDF5's format with checksums on its own tables, which HDF5 1.10 and all later versions read."""
-
-LARGEST_CHUNK = 1 << 30
-"""Bytes of a chunk, unpacked: a frame of ten million disks has a quarter of these."""
-
-LARGEST_SHAPE = 1 << 45
-"""Bytes that a dataset would have with all of its rows written, 35 TB."""
-
-
-UNREADABLE = (
-    OSError, EOFError, zlib.error, ValueError, LookupError, TypeError, AttributeError, OverflowError, RuntimeError,
-    StopIteration,
-)  # fmt: skip
-"""What readers meet in files that are damaged, or of another format than their name says."""
-
 
 @contextmanager
-def telling(path: object, says: str, errors: tuple[type[Exception], ...] = UNREADABLE) -> Iterator[None]:
-    """Tell in one sentence, a PackingFileError, what fails within, unless it is one already.
+def telling(path: object, says: str, errors: type[Exception] = Exception) -> Iterator[None]:
+    """Tell in one sentence, a PackingFileError, what fails within, unless a sentence tells it already.
 
     Parameters
     ----------
@@ -110,20 +82,18 @@ def telling(path: object, says: str, errors: tuple[type[Exception], ...] = UNREA
         The file, or another source.
     says : str
         What of it, as in "is no readable GSD file"; the reason of the error follows.
-    errors : tuple of types
-        What is told.
+    errors : type
+        What is told; by default all that readers meet in damaged files, or of another format than their name says.
     """
     try:
         yield
-    except PackingFileError:
+    except (PackingFileError, MemoryError):
         raise
     except errors as error:
-        reason = (
-            str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".") or "it breaks off"
-        )
+        reason = str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".")
         reason = "its brackets are nested too deeply" if isinstance(error, RecursionError) else reason
         lacks = "it lacks " if isinstance(error, KeyError) else ""
-        raise PackingFileError(f"{path} {says}: {lacks}{reason}.") from error
+        raise PackingFileError(f"{path} {says}: {lacks}{reason or 'it breaks off'}.") from error
 
 
 def open_plain(path: str | PathLike[str]) -> BinaryIO:
@@ -131,14 +101,15 @@ def open_plain(path: str | PathLike[str]) -> BinaryIO:
 
     Raises OSError if the file cannot be read, or is a folder, a pipe, a socket or a device.
     """
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe without a writer opens at once
-    kind = os.fstat(descriptor).st_mode
-    if stat.S_ISREG(kind):
-        return os.fdopen(descriptor, "rb")
-    os.close(descriptor)
-    if stat.S_ISDIR(kind):
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    raise OSError(errno.EINVAL, "it is a pipe or a device, and no plain file", str(path))
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError(errno.EINVAL, "it is a folder, a pipe or a device, and no plain file", str(path))
+    return open(path, "rb")
+
+
+def begins_with(path: Path, *beginnings: bytes) -> bool:
+    """Whether a file begins in one of some ways; OSError if it cannot be read."""
+    with open_plain(path) as stream:
+        return stream.read(64).startswith(beginnings)
 
 
 def open_text(path: str | PathLike[str]) -> TextIO:
@@ -147,7 +118,7 @@ def open_text(path: str | PathLike[str]) -> TextIO:
     Raises OSError as `open_plain` does. Who reads a damaged text meets an EOFError, a zlib.error or an OSError.
     """
     stream = open_plain(path)
-    compressed = stream.read(len(GZIP)) == GZIP
+    compressed = stream.read(2) == b"\x1f\x8b"  # LAMMPS compresses a dump whose name ends in .gz
     stream.seek(0)
     return gzip.open(stream, "rt", encoding="utf-8") if compressed else TextIOWrapper(stream, encoding="utf-8")
 
@@ -192,7 +163,8 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
             if target.exists():
                 os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
         yield part
-        _add_trailer(part)
+        with part.open("ab") as stream:
+            stream.write(TRAILERS.get(part.suffix.lower(), b""))
         _synchronise(part)
         os.replace(part, target)
         _synchronise(target.parent)
@@ -203,17 +175,6 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
             raise
         kept = "what it held before is kept" if target.exists() else "there is no such file now"
         raise OutputError(f"{path} cannot be written: {error.strerror or error}; {kept}.") from error
-
-
-def _add_trailer(path: Path) -> None:
-    """Mark a new file, in a format that ends in a mark."""
-    kind = path.suffix.lower()
-    with path.open("r+b") as stream:
-        size = stream.seek(0, os.SEEK_END)
-        stream.seek(max(size - END_OF_PNG, 0) if kind == ".png" else size)
-        last = stream.read()
-        stream.seek(-len(last), os.SEEK_END)
-        stream.write(TRAILERS.get(kind, b"") + last)
 
 
 def _synchronise(path: Path) -> None:
@@ -249,8 +210,9 @@ def check_own(path: Path, head: str = "") -> None:
 
 def check_format(number: object, where: object) -> None:
     """Refuse a file of a later format with a PackingFileError; files of older versions have no number, None."""
-    if number is not None and not (str(number).isdecimal() and int(str(number)) <= FORMAT):
-        says = f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}"
+    known = str(number).removesuffix(".0")
+    if number is not None and not (known.isdecimal() and int(known) <= FORMAT):
+        says = f"{where} has format {known} of faultgouge's files, and this version knows {FORMAT}"
         raise PackingFileError(f"{says}: a later version wrote it, so update faultgouge.")
 
 
@@ -279,17 +241,13 @@ def check_output(path: Path, *inputs: Path, head: str = "") -> None:
         If the folder of the file does not exist, or may not be written to, or the file is a folder, one of the
         inputs, read-only, or not of this program (see `check_own` for `head`).
     """
+    folder = path.absolute().parent
     if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
-    folder, reason = path.absolute().parent, ""
     if path.is_dir():
-        reason = "it is a folder: give the name of a file"
-    elif not folder.is_dir():
-        reason = f"there is no folder {folder}; make it first"
-    elif not os.access(folder, os.W_OK):
-        reason = f"the folder {folder} may not be written to"
-    if reason:
-        raise OutputError(f"{path} cannot be written: {reason}.")
+        raise OutputError(f"{path} cannot be written: it is a folder: give the name of a file.")
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise OutputError(f"{path} cannot be written: there is no folder {folder} that may be written to.")
     check_own(path, head)
 
 
@@ -324,13 +282,13 @@ def lock_output(path: Path) -> Iterator[None]:
             # who had it before may just have removed it from under its name
             held = lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
         except BlockingIOError:
-            os.close(descriptor)
             says = "another run is writing it: wait for its end, or give another name"
             raise OutputError(f"{path} cannot be written, since {says}.") from None
         except OSError:  # a file system without locks
             held = True
-        if not held:
-            os.close(descriptor)
+        finally:
+            if not held:
+                os.close(descriptor)
     try:
         yield
     finally:
@@ -348,10 +306,10 @@ def lock_of(path: Path) -> Path | None:
 
 
 def new_sealed() -> h5py.File:
-    """An empty file of HDF5 in memory."""
+    """An empty file of HDF5 in memory, with checksums on HDF5's own tables."""
     import h5py
 
-    return h5py.File("new", "w", driver="core", backing_store=False, block_size=BYTES_AT_A_TIME, libver=LIBVER)
+    return h5py.File("new", "w", driver="core", backing_store=False, block_size=1 << 20, libver=("v110", "v110"))
 
 
 def write_sealed(path: Path, file: h5py.File) -> None:
@@ -359,71 +317,51 @@ def write_sealed(path: Path, file: h5py.File) -> None:
     file.attrs[FORMAT_KEY] = FORMAT
     file.flush()
     image = file.id.get_file_image()
-    write_whole(path, _header(hashlib.sha256(image).hexdigest(), len(image)), image)
+    write_whole(path, _header(image), image)
 
 
-def _header(digest: str, size: int) -> bytes:
-    words = SEAL + f"sha256 {digest}\nbytes {size}\nHDF5 from byte {HEADER_SIZE} on\n".encode()
-    return words.ljust(HEADER_SIZE - 1) + b"\n"
+def _header(image: bytes) -> bytes:
+    words = f"sha256 {hashlib.sha256(image).hexdigest()}\nbytes {len(image)}\nHDF5 from byte {HEADER_SIZE} on\n"
+    return (SEAL + words.encode()).ljust(HEADER_SIZE - 1) + b"\n"
 
 
 def open_sealed(path: Path, writable: bool = False) -> h5py.File:
-    """Open a file that has been checked whole; its content in memory, if it is to be changed.
+    """Open a file that has been checked whole; its content is in memory.
 
-    Raises PackingFileError if the file is missing, damaged, of a later format, or unpacks to what is not in it.
+    Raises PackingFileError if the file is missing, damaged, of a later format, or has numbers that are not in it.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     import h5py
 
-    with telling(path, "cannot be read", (OSError,)):
-        with open_plain(path) as stream:
-            header, digest, size = stream.read(HEADER_SIZE), hashlib.sha256(), 0
-            if not header.startswith(SEAL):
-                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
-                says = f"is not a readable HDF5 file, as it begins like none: {convert}"
-                says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
-                raise PackingFileError(f"{path} {says}.")
-            while block := stream.read(BYTES_AT_A_TIME):
-                digest.update(block)
-                size += len(block)
-        if header != _header(digest.hexdigest(), size):
-            says = f"{path} is damaged: its {size} bytes do not have the checksum that was written with them"
-            raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
-        if writable:
-            image = read_plain(path)[HEADER_SIZE:]
-            file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))
-        else:
-            try:
-                file = h5py.File(path, "r", locking=False)
-            except OSError:  # another reader in this process, such as MDAnalysis, has it open with locks
-                file = h5py.File(path, "r")
-    try:
-        check_format(file.attrs.get(FORMAT_KEY), "it")
-        _refuse_what_is_not_in_it(file)
-    except Exception as error:  # h5py raises nearly every exception there is
+    with telling(path, "cannot be read", OSError), open_plain(path) as stream:
+        header, image = stream.read(HEADER_SIZE), stream.read()
+    if not header.startswith(SEAL):
+        convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
+        says = f"is not a readable HDF5 file, as it begins like none: {convert}"
+        says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
+        raise PackingFileError(f"{path} {says}.")
+    if header != _header(image):
+        says = f"{path} is damaged: its {len(image)} bytes do not have the checksum that was written with them"
+        raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
+    with telling(path, "is damaged, or is none of this program's files"):
+        file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW if writable else 0))
+        number, strange = file.attrs.get(FORMAT_KEY), file.visititems_links(lambda *each: _not_in(file, *each))
+        if strange is None:
+            check_format(number, path)
+            return file
         file.close()
-        said = str(error).strip().rstrip(".") or type(error).__name__
-        cannot = "" if isinstance(error, PackingFileError) else "it cannot be read: "
-        raise PackingFileError(f"{path} is refused: {cannot}{said}.") from error
-    return file
+        raise ValueError(f"/{strange} has its numbers in another file, or more than this machine has memory")
 
 
-def _refuse_what_is_not_in_it(file: h5py.File) -> None:
-    """Refuse links to other files, and datasets that would fill the memory of the machine."""
+def _not_in(file: h5py.File, name: str, link: object) -> str | None:
+    """The name, if its numbers are in another file, or do not fit into the memory of this machine."""
     import h5py
 
-    links, unpacked = list[tuple[str, object]](), dict[int, int]()
-    file.visititems_links(lambda name, link: links.append((name, link)))
-    for name, link in links:
-        if isinstance(link, h5py.ExternalLink):
-            raise PackingFileError(f"/{name} is a link to another file")
-        if isinstance(item := file[name], h5py.Dataset):
-            if item.external or item.is_virtual:
-                raise PackingFileError(f"/{name} has its numbers in another file")
-            chunk = math.prod(item.chunks or ()) * item.dtype.itemsize
-            if item.nbytes > LARGEST_SHAPE or chunk > LARGEST_CHUNK:
-                raise PackingFileError(f"/{name} has the shape {item.shape}, and chunks of {chunk} bytes")
-            unpacked[h5py.h5o.get_info(item.id).addr] = item.id.get_num_chunks() * chunk if item.chunks else 0
-    if (size := sum(unpacked.values())) > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
-        raise PackingFileError(f"its datasets unpack to {size} bytes, more than this machine has memory")
+    item = None if isinstance(link, h5py.ExternalLink) else file[name]
+    if item is not None and not isinstance(item, h5py.Dataset):
+        return None
+    if item is None or item.external or item.is_virtual:
+        return name
+    largest = max(item.nbytes, math.prod(item.chunks or ()) * item.dtype.itemsize)
+    return name if largest > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") else None

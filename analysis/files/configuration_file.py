@@ -11,15 +11,24 @@ The file is sealed like every run.h5 (:mod:`.atomic_write`), and is H5MD 1.1::
 """
 
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
-from .atomic_write import SEAL, new_sealed, open_plain, open_sealed, telling, write_sealed
-from .runfile import CHECKSUM, write_h5md
+from .atomic_write import SEAL, begins_with, new_sealed, open_sealed, telling, write_sealed
+
+if TYPE_CHECKING:
+    import h5py
+
+CREATOR = "faultgouge"
+
+CHECKSUM: dict[str, Any] = {"fletcher32": True}
+"""A checksum for every chunk, for readers other than this one."""
 
 SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
 ARRAYS = (
@@ -45,25 +54,24 @@ def write_configuration(
     OutputError
         If the file cannot be written.
     """
+    c = configuration
     with new_sealed() as file:
         write_h5md(file)
         particles, group = file.create_group("particles/particles"), file.create_group("snapshot")
-        position = np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
+        position = np.pad(c.position, ((0, 0), (0, 3 - c.dimension)))
         for name, value in (("value", position[None]), ("step", np.zeros(1, int)), ("time", np.zeros(1))):
             particles[f"position/{name}"] = value
-        sides = ["periodic" if each else "none" for each in configuration.periodic]
-        particles["box/edges"] = np.linalg.norm(configuration.box, axis=1)
+        particles["box/edges"] = np.linalg.norm(c.box, axis=1)
+        sides = ["periodic" if each else "none" for each in c.periodic]
         particles["box"].attrs.update({"dimension": 3, "boundary": sides})
-        group.attrs.update({name: getattr(configuration, name) for name in SCALARS})
-        if configuration.proof is not None:
-            group.attrs["proof"] = configuration.proof
-        if configuration.remarks:
-            group.attrs["remarks"] = list(configuration.remarks)
+        more = {"proof": c.proof, "remarks": list(c.remarks) or None}
+        numbers = {name: getattr(c, name) for name in SCALARS} | more
+        group.attrs.update({name: value for name, value in numbers.items() if value is not None})
         for name in ARRAYS:
-            group[name] = getattr(configuration, name)
-        given = {name: matrix for name in MATRICES if (matrix := getattr(configuration, name)) is not None}
+            group[name] = getattr(c, name)
+        given = {name: matrix for name in MATRICES if (matrix := getattr(c, name)) is not None}
         parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in MATRIX_PARTS}
-        parts |= {f"contacts/{name}": getattr(configuration.contacts, name) for name in PER_CONTACT}
+        parts |= {f"contacts/{name}": getattr(c.contacts, name) for name in PER_CONTACT}
         for name, values in parts.items():
             group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
         file.attrs.update(attributes or {})
@@ -75,11 +83,7 @@ def holds_configuration(path: Path) -> bool:
 
     Raises PackingFileError if the file has changed since it was sealed.
     """
-    try:
-        with open_plain(path) as stream:
-            if stream.read(len(SEAL)) != SEAL:
-                return False
-    except OSError:
+    if not path.is_file() or not begins_with(path, SEAL):
         return False
     with open_sealed(path) as file:
         return "snapshot" in file
@@ -99,3 +103,14 @@ def read_configuration(path: Path) -> Configuration:
             given[name].check_format()
         given["remarks"] = [str(each) for each in group.attrs.get("remarks", ())]
         return Configuration(contacts=LinearisedContacts(**contacts), **given)
+
+
+def write_h5md(file: "h5py.File") -> None:
+    """The version of H5MD, and what has written the file; no version where it is not installed."""
+    try:
+        program = version(CREATOR)
+    except PackageNotFoundError:
+        program = ""
+    file.create_group("h5md").attrs["version"] = np.array([1, 1])
+    file.create_group("h5md/author").attrs["name"] = CREATOR
+    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})

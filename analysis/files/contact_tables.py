@@ -30,15 +30,13 @@ not tell.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Indices, derive_frozen
+from ..arrays import Floats, derive_frozen
 from ..configuration import Configuration
 from ..contacts import WALL
 from ..counted import counted
@@ -47,8 +45,8 @@ from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
 from .atomic_write import telling
 from .formats import read_particles
-from .formats.disks import choose_frame, sorted_columns
-from .formats.tables import columns_of, contact_columns, lines_of, number_of, require_columns, strip_comments
+from .formats.disks import Disks, choose_frame
+from .formats.tables import columns_of, contact_columns, lines_of, number_of, strip_comments
 
 HALF_A_DIGIT = 5e-6
 """Largest relative error of a number that is rounded to six digits."""
@@ -71,28 +69,6 @@ FORCES = ["fn", "fx", "fy", "fz", *(f"{name}{axis}" for name in ("ft", "fn", "fs
 """Names of columns with forces."""
 
 
-@dataclass(frozen=True, eq=False)
-class Spheres:
-    """Spheres of a table: IDs, places (N, 2 or 3), radii, masses where they are known, and the box."""
-
-    source: str
-    id: Indices
-    position: Floats
-    radius: Floats
-    mass: Floats | None
-    box: Floats | None
-    origin: Floats
-    periodic: NDArray[np.bool_] | None
-
-    def of_material(self, material: Material, **more: Any) -> Configuration:
-        """The spheres with Hertz's contacts, or springs; in a sentence of their table where they form no packing."""
-        mass = self.mass if material.density is None else None
-        periodic = [False] * 3 if self.periodic is None else self.periodic
-        options = {"box": self.box, "origin": self.origin, "mass": mass, "periodic": periodic} | more
-        with telling(self.source, "describes no possible packing", (ValueError,)):
-            return spheres_of_material(self.position, self.radius, material, **options)
-
-
 def material_of(text: str) -> Material:
     """A material of key=value,...; a BadInputError names the word that is wrong."""
     given: dict[str, float] = {}
@@ -104,15 +80,18 @@ def material_of(text: str) -> Material:
     return Material(**given).checked()
 
 
-def read_spheres(path: Path, frame: int = -1) -> Spheres:
+def read_spheres(path: Path, frame: int = -1) -> Disks:
     """Read the spheres of a table; a PackingFileError if a column is missing, or has what no sphere can have."""
-    found = read_particles(path, frame)
-    c, _ = sorted_columns(found)
-    position = np.column_stack([c[name] for name in ("x", "y", "z")[: 3 if "z" in c and np.ptp(c["z"]) else 2]])
-    origin = np.zeros(3) if found.origin is None else found.origin
-    periodic = None if found.periodic is None else np.array(found.periodic)
-    ids, mass = c["id"].astype(np.int64), c.get("mass")
-    return Spheres(found.source, ids, position, c["radius"], mass, found.box, origin, periodic)
+    return read_particles(path, frame)
+
+
+def of_material(spheres: Disks, material: Material, **more: Any) -> Configuration:
+    """Spheres with Hertz's contacts, or springs; in a sentence of their table where they form no packing."""
+    mass = spheres.mass if material.density is None else None
+    periodic = [False] * 3 if spheres.periodic is None else spheres.periodic
+    options = {"box": spheres.box, "origin": spheres.origin, "mass": mass, "periodic": periodic} | more
+    with telling(spheres.source, "describes no possible packing", ValueError):
+        return spheres_of_material(spheres.position, spheres.radius, material, **options)
 
 
 def _fstat(path: Path, frame: int) -> dict[str, Floats]:
@@ -126,7 +105,7 @@ def _fstat(path: Path, frame: int) -> dict[str, Floats]:
 
 
 def read_contacts(
-    spheres: Spheres, path: Path, material: Material, columns: Sequence[str] | None = None, frame: int = -1
+    spheres: Disks, path: Path, material: Material, columns: Sequence[str] | None = None, frame: int = -1
 ) -> Configuration:
     """The packing of spheres and a table of contacts with forces, under a load that balances what the digits leave.
 
@@ -136,83 +115,75 @@ def read_contacts(
         If a column is missing, a contact names a sphere that is not there or two that do not touch, or forces are out
         of balance.
     """
-    fstat = path.suffix == ".fstat"
-    table = _fstat(path, frame) if fstat else contact_columns(path, frame=frame, names=columns)
-    require_columns(path, table, "id1", "id2")
+    if path.suffix == ".fstat":
+        table = _fstat(path, frame)
+    else:
+        table = contact_columns(path, "id1", "id2", frame=frame, names=columns)
     # neighbours that do not touch have rows of zeros in pair/local
-    forces = [table[name] != 0 for name in FORCES if name in table]
-    bears = np.any(forces, axis=0) if forces else np.ones(len(table["id1"]), bool)
+    given = [table[name] != 0 for name in FORCES if name in table]
+    bears = np.any(given, axis=0) if given else np.ones(len(table["id1"]), bool)
     table = {name: column[bears] for name, column in table.items()}
     ids = np.array([table["id1"], table["id2"]])
     i, j = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
-    walls = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
-    j[walls] = WALL
-    for strange in [*ids[0][spheres.id[i] != ids[0]], *ids[1][~walls & (spheres.id[j] != ids[1])]]:
+    wall = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
+    j[wall] = WALL
+    for strange in [*ids[0][spheres.id[i] != ids[0]], *ids[1][~wall & (spheres.id[j] != ids[1])]]:
         raise PackingFileError(f"{path}: a contact names sphere {strange:g}, which is not in {spheres.source}.")
     for itself in ids[0][i == j]:
         raise PackingFileError(f"{path}: sphere {itself:g} touches itself.")
-    branch, periodic = _branches(spheres, path, table, i, j)
-    n = branch / np.linalg.norm(branch, axis=1)[:, None]
-    fn, ft = _forces(path, table, n)
-    # each contact once, though .fstat may have it from both sides
-    place = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
-    _, once = np.unique(np.column_stack([np.minimum(i, j), np.maximum(i, j), place]), axis=0, return_index=True)
-    i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
-    size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
-    for worst in np.flatnonzero(size > (1 + AT_REST) * bound):
-        says = (
-            f"|f_t| of {spheres.id[i[worst]]} is {size[worst] / max(fn[worst], 1e-300):.4g} f_n, beyond the coefficient"
-        )
-        raise PackingFileError(f"{path}: {says} of friction {material.friction:g}: give --material friction=.")
-    # what the digits do not tell from the bound is at the bound
-    ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
 
-    def packing(tangential: Floats) -> tuple[Configuration, float]:
-        forces = {"contacts": (i, j, branch), "normal_force": fn, "tangential_force": tangential}
-        found = spheres.of_material(material, periodic=periodic, **forces)
-        return found, _out_of_balance(found)
-
-    (found, lacks), (other, flipped) = packing(ft), packing(-ft)
-    remarks = []
-    if flipped < BETTER_SIGN * lacks:
-        found, lacks = other, flipped
-        remarks.append("tangential forces are those on the second particle: with the other sign they do not balance")
-    if lacks > AT_REST:
-        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
-        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
-    remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
-    return derive_frozen(found, remarks=tuple(remarks))
-
-
-def _branches(
-    spheres: Spheres, path: Path, table: Mapping[str, Floats], i: Indices, j: Indices
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Vectors from the second partner to the first, through the sides of the box where they do not touch otherwise."""
+    # vectors from the second to the first, through the sides of the box where they do not touch otherwise
     place = np.pad(spheres.position, ((0, 0), (0, 3 - spheres.position.shape[1])))
-    wall, second = j < 0, np.maximum(j, 0)
-    branch = place[i] - place[second]
+    branch, reach = place[i] - place[j], np.where(wall, np.inf, spheres.radius[i] + spheres.radius[j])
     if wall.any():
         if "px" not in table:
             raise PackingFileError(f"{path} has contacts with walls, and no px, py, pz: where each wall is touched.")
         # a point in the middle of the overlap is on the line through the centre, whatever wall it is
         branch[wall] = (place[i] - np.column_stack([table[f"p{axis}"] for axis in "xyz"]))[wall]
-    reach = np.where(wall, np.inf, spheres.radius[i] + spheres.radius[second])
     apart = np.linalg.norm(branch, axis=1) > TOUCHING * reach
-    sides = np.zeros(3, bool) if spheres.periodic is None else spheres.periodic
+    periodic = np.array([False] * 3 if spheres.periodic is None else spheres.periodic)
     if apart.any() and spheres.box is not None:
         # where the file does not say which sides are periodic: those that a contact needs
-        may = np.ones(3, bool) if spheres.periodic is None else sides
+        may = periodic | (spheres.periodic is None)
         images = np.where(may, np.round(branch @ np.linalg.inv(spheres.box)), 0.0) * apart[:, None]
         branch = branch - images @ spheres.box
-        sides = sides if spheres.periodic is not None else images.any(axis=0)
+        periodic = images.any(axis=0) if spheres.periodic is None else periodic
     gap = np.linalg.norm(branch, axis=1) - reach
     for k in np.flatnonzero(gap > (TOUCHING - 1) * reach):
         says = f"spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are {gap[k]:.3g} apart"
         raise PackingFileError(f"{path}: {says}: give the places of the same moment, and the box.")
-    return branch, sides
+    n = branch / np.linalg.norm(branch, axis=1)[:, None]
+    fn, ft = _forces(path, table, n)
+
+    # each contact once, though .fstat may have it from both sides
+    image = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
+    _, once = np.unique(np.column_stack([np.minimum(i, j), np.maximum(i, j), image]), axis=0, return_index=True)
+    i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
+    size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
+    for k in np.flatnonzero(size > (1 + AT_REST) * bound):
+        says = f"|f_t| of {spheres.id[i[k]]} is {size[k] / max(fn[k], 1e-300):.4g} f_n"
+        beyond = f"beyond the coefficient of friction {material.friction:g}: give --material friction=."
+        raise PackingFileError(f"{path}: {says}, {beyond}")
+    # what the digits do not tell from the bound is at the bound
+    ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
+
+    found, lacks, remarks = None, np.inf, list[str]()
+    for sign in (1.0, -1.0):
+        more = {"contacts": (i, j, branch), "normal_force": fn, "tangential_force": sign * ft, "periodic": periodic}
+        other = of_material(spheres, material, **more)
+        flipped = _out_of_balance(other)
+        if found is None or flipped < BETTER_SIGN * lacks:
+            found, lacks = other, flipped
+            remarks += ["tangential forces are those on the second particle: with the other sign they do not balance"]
+    assert found is not None
+    if lacks > AT_REST:
+        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
+        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
+    balance = f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left"
+    return derive_frozen(found, remarks=(*remarks[1:], balance))
 
 
-def _forces(path: Path, table: Mapping[str, Floats], n: Floats) -> tuple[Floats, Floats]:
+def _forces(path: Path, table: dict[str, Floats], n: Floats) -> tuple[Floats, Floats]:
     """f_n and f_t on the first partner."""
 
     def vectors(name: str) -> Floats | None:

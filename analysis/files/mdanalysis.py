@@ -27,8 +27,6 @@ from .runfile import RunFile
 FORMAT = "H5"
 """MDAnalysis's name of a format is the suffix of its files; its own suffix of H5MD is .h5md."""
 
-DISK_TYPES = "bed", "top"
-
 
 class RunFileParser(TopologyReaderBase):
     """Radii, masses and types of a run.h5, for ``MDAnalysis.Universe``."""
@@ -43,15 +41,9 @@ class RunFileParser(TopologyReaderBase):
         with RunFile(self.filename) as file:
             packing = file.packing(0)
         count = len(packing)
-        attributes = [
-            Atomids(np.arange(1, count + 1)),
-            Atomtypes(np.array(DISK_TYPES, dtype=object)[packing.top.astype(int)]),
-            Masses(packing.mass),
-            Radii(packing.radius),
-            Resids(np.array([1])),
-            Resnums(np.array([1])),
-            Segids(np.array(["disks"], dtype=object)),
-        ]
+        types, segments = np.where(packing.top, "top", "bed").astype(object), np.array(["disks"], dtype=object)
+        attributes = [Atomids(np.arange(1, count + 1)), Atomtypes(types), Masses(packing.mass), Radii(packing.radius)]
+        attributes += [Resids(np.array([1])), Resnums(np.array([1])), Segids(segments)]
         return Topology(count, 1, 1, attrs=attributes)
 
 

@@ -20,6 +20,7 @@ each disk balances each such packing, and no motion of a real packing or of LAMM
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ from ..errors import PackingFileError
 from ..motion.eigenvalues import active_coordinates, mass_weighted
 from ..motion.stability import stability
 from ..operators.stiffness import stiffness_matrix
+from .atomic_write import telling
+from .formats.disks import choose_frame
 
 USUAL_ERROR = 1 / 6
 """Error of f_n where the table has one row, or two equal ones, for a contact: the median of photoelastic tables."""
@@ -49,23 +52,15 @@ NO_RATE = "no growth rate is given: it comes from the small asymmetric part of K
 def is_measured(contacts: Path) -> bool:
     """Whether a table of contacts has rows of five numbers between commas from its first line on."""
     with contacts.open(errors="replace") as lines:
-        words = next(lines, "").split(",")
-    try:
-        return len([float(word) for word in words]) == 5
-    except ValueError:
-        return False
+        return bool(re.fullmatch(",".join(5 * [r"\s*(?:[-+.\deE]+|nan|inf)\s*"]), next(lines, "")))
 
 
-def _rows(path: Path, widths: tuple[int, ...]) -> Floats:
-    try:
+def _rows(path: Path, *widths: int) -> Floats:
+    with telling(path, "is no table of numbers between commas"):
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise PackingFileError(f"{path} is no table of numbers between commas: {error}") from error
     if rows.shape[1] not in widths or not np.isfinite(rows).all():
-        raise PackingFileError(
-            f"{path} has rows of {rows.shape[1]} numbers: RigidLibrary's particles have [step,] id, x, y, radius, flag "
-            "and its contacts step, id1, id2, ft, fn, all finite."
-        )
+        needs = "particles have [step,] id, x, y, radius, flag and its contacts step, id1, id2, ft, fn, all finite"
+        raise PackingFileError(f"{path} has rows of {rows.shape[1]} numbers: RigidLibrary's {needs}.")
     return rows
 
 
@@ -91,28 +86,25 @@ def measured_forces(
     PackingFileError
         If a table is none of RigidLibrary's, or a contact names a disk that is not there.
     """
-    disks, rows = _rows(particles, (5, 6)), _rows(contacts, (5,))
+    disks, rows = _rows(particles, 5, 6), _rows(contacts, 5)
     steps = np.unique(rows[:, 0])
-    if not -len(steps) <= frame < len(steps):
-        raise PackingFileError(f"{contacts} has {counted(len(steps), 'step')}, and no number {frame}.")
-    rows = rows[rows[:, 0] == steps[frame]]
+    step = steps[choose_frame(contacts, [0] * len(steps), frame)]
+    rows = rows[rows[:, 0] == step]
     if disks.shape[1] == 6:
-        disks = disks[disks[:, 0] == steps[frame]][:, 1:]
+        disks = disks[disks[:, 0] == step][:, 1:]
     walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
-    rows = rows[~walls]
-    where = {int(each): k for k, each in enumerate(disks[:, 0])}
-    strange = [each for each in rows[:, 1:3].ravel() if int(each) not in where]
-    if strange:
-        raise PackingFileError(f"{contacts}: a contact names disk {strange[0]:g}, which is not in {particles}.")
+    rows, ids = rows[~walls], disks[:, 0]
+    for strange in np.setdiff1d(rows[:, 1:3], ids):
+        raise PackingFileError(f"{contacts}: a contact names disk {strange:g}, which is not in {particles}.")
     # mean of the rows of each pair; the tangent turns with the normal, so that f_t is the same from both sides
-    ends = np.sort([[where[int(one)], where[int(other)]] for one, other in rows[:, 1:3]], axis=1)
+    ends = np.sort(np.argsort(ids)[np.searchsorted(np.sort(ids), rows[:, 1:3])], axis=1)
     pairs, place, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
-    tangential, normal = (np.bincount(place.ravel(), rows[:, k]) / count for k in (3, 4))
-    i, j = pairs[normal > 0].T
-    differ = np.abs(rows[:, 4] - normal[place.ravel()]) / np.maximum(normal[place.ravel()], np.finfo(float).tiny)
-    twice = differ[(count[place.ravel()] > 1) & (differ > 0)]
+    place = place.ravel()
+    ft, fn = (np.bincount(place, rows[:, k], len(pairs)) / count for k in (3, 4))
+    differ = np.abs(rows[:, 4] - fn[place]) / np.maximum(fn[place], np.finfo(float).tiny)
+    twice = differ[(count[place] > 1) & (differ > 0)]
     error = 2 * float(np.median(twice)) if len(twice) else USUAL_ERROR
-    fn, ft = normal[normal > 0], tangential[normal > 0]
+    (i, j), fn, ft = pairs[fn > 0].T, fn[fn > 0], ft[fn > 0]
     centre, radius = disks[:, 1:3], disks[:, 3]
     branch = np.pad(centre[i] - centre[j], ((0, 0), (0, 1)))
     along = np.cross([0.0, 0.0, 1.0], branch / np.linalg.norm(branch, axis=1)[:, None])
@@ -126,44 +118,38 @@ def measured_forces(
         )  # fmt: skip
         return derive_frozen(found, inertia=0.5 * mass * radius**2)
 
+    touches, own = (np.bincount(np.append(i, j), each, len(radius)) for each in (None, np.append(fn, fn)))
+    inside = touches > 2  # fewer are rattlers, or held by a wall that the files do not have
+
     def imbalance(found: Configuration) -> Floats:
-        force, own = found.contact_force[:, 0], np.bincount(np.concatenate([i, j]), np.tile(fn, 2), len(radius))
-        touches = np.bincount(np.concatenate([i, j]), minlength=len(radius))
-        inside = touches > 2  # fewer are rattlers, or held by a wall that the files do not have
-        return np.asarray(np.linalg.norm(force, axis=1)[inside] * touches[inside] / own[inside])
+        return np.asarray(np.linalg.norm(found.contact_force[:, 0], axis=1)[inside] * touches[inside] / own[inside])
 
     found, other = packing(fn, ft), packing(fn, -ft)
-    lacks, flipped = imbalance(found), imbalance(other)
-    if len(lacks) and flipped.mean() < lacks.mean():
-        found, lacks, ft = other, flipped, -ft
-    at_bound = int(found.contacts.at_bound.sum())
+    if inside.any() and imbalance(other).mean() < imbalance(found).mean():
+        found, ft = other, -ft
     rng, seen = np.random.default_rng(0), []
     for _ in range(draws):
         drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
         seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
     unknown = f", and {seen.count(None)} not known" if None in seen else ""
     left_out = f"; {counted(int(walls.sum()), 'row')} of walls left out, whose place no file has" if walls.any() else ""
+    # motions of the disks in contact that stretch no spring, without translations and rotation as a whole
+    c, none = found.contacts, np.zeros_like(found.contacts.normal)
+    sticking = np.where(c.at_bound, 0.0, c.tangential_stiffness)
+    bare = derive_frozen(c, normal_force=0 * fn, tangential_force=none, closing=none, parting=none,
+                         tangential_stiffness=sticking)  # fmt: skip
+    matrix = mass_weighted(stiffness_matrix(derive_frozen(found, contacts=bare)), found)
+    moves = active_coordinates(matrix)
+    values = eigvalsh(matrix[moves][:, moves].toarray())
+    floppy = 3 * np.count_nonzero(touches) - 3 - int(np.sum(values > FREE_OF_SPRINGS * values[-1]))
+    lacks = np.median(imbalance(found)) if inside.any() else 0.0
     says = [
-        f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {at_bound} at Coulomb's bound; "
-        f"forces on a disk are out of balance by {np.median(lacks) if len(lacks) else 0:.2g} of its mean contact force "
-        f"(median), and f_n is taken with an error of {error:.2g}{left_out}",
-        f"{_floppy(found)} motions without stiffness beside those of a free body, if contacts at the bound slide",
+        f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {int(c.at_bound.sum())} at "
+        f"Coulomb's bound; forces on a disk are out of balance by {lacks:.2g} of its "
+        f"mean contact force (median), and f_n is taken with an error of {error:.2g}{left_out}",
+        f"{floppy} motions without stiffness beside those of a free body, if contacts at the bound slide",
         f"unstable in {seen.count(False)} of {draws} draws of the forces within this error{unknown}, if a load on "
         "each disk balanced the forces drawn",
         NO_RATE,
     ]
     return derive_frozen(found, slips_known=False, remarks=tuple(says)), says
-
-
-def _floppy(found: Configuration) -> int:
-    """Motions of the disks in contact that stretch no spring, without translations and rotation as a whole."""
-    c, none = found.contacts, np.zeros_like(found.contacts.normal)
-    springs = derive_frozen(
-        c, normal_force=np.zeros(len(c)), tangential_force=none, closing=none, parting=none,
-        tangential_stiffness=np.where(c.at_bound, 0.0, c.tangential_stiffness),
-    )  # fmt: skip
-    matrix = mass_weighted(stiffness_matrix(derive_frozen(found, contacts=springs)), found)
-    moves = active_coordinates(matrix)
-    values = eigvalsh(matrix[moves][:, moves].toarray())
-    disks = len(np.unique(np.concatenate([c.i, c.j])))
-    return 3 * disks - 3 - int(np.sum(values > FREE_OF_SPRINGS * values[-1]))

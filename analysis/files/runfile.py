@@ -20,16 +20,12 @@ Every element with a T is a group of ``value`` and of links to one common ``step
 it.
 
 The trajectory of an undamped run follows after its initial equilibrium, as further frames of position with the time of
-the run: readers of H5MD step through both. fx and fy are those of the equilibrium; all other observables of such a
-frame are nan, or 0 for integers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
-parts of its positions.
+the run, and with fx and fy of the equilibrium; all other observables are nan there, or 0. ``/faultgouge/trajectory``
+has its times, so that it counts these frames, and low parts of its positions.
 
-The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.atomic_write`). The
-attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
-state in ``/checkpoint``.
-
-Datasets depend on the scene alone. The circumstances of the run (resolved scene, versions, seed, ranks) are attributes
-of the root. One file contains one set of disks and one law.
+The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.atomic_write`). The attribute
+``complete`` of the root is false until the run has ended; until then, it continues from the state in ``/checkpoint``.
+Datasets depend on the scene alone; scene, versions, seed and ranks are attributes of the root.
 """
 
 from __future__ import annotations
@@ -38,7 +34,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from functools import cached_property
-from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
 from time import monotonic
@@ -53,6 +48,7 @@ from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
 from .atomic_write import new_sealed, open_sealed, telling, write_sealed
+from .configuration_file import CHECKSUM, write_h5md
 
 if TYPE_CHECKING:
     import h5py
@@ -60,15 +56,10 @@ if TYPE_CHECKING:
 NONE_GIVEN = "none were given"
 """The attribute tangential_forces of older files, where slips are not known."""
 
-CREATOR = "faultgouge"
-
 SHARE_OF_SAVING = 0.05
 """Share of the time that saving takes, at the most: a frame or a part of a series waits that long to be saved."""
 
-CHECKSUM = {"fletcher32": True}
-"""A checksum for every chunk, for readers other than this one."""
-
-COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
+COMPACT: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
@@ -84,17 +75,7 @@ class RunFile:
     A file that is open for appending is kept in memory. When it is saved, all of it replaces the stored file; saving
     takes at most a fixed share of the time, so that a file that grows for a long time is not written too often.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    mode : {"r", "a"}
-        Read, or read and append. :meth:`create` makes a new one.
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, broken, or not written by this class.
+    Raises PackingFileError if the file is missing, broken, or not written by this class.
     """
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
@@ -104,8 +85,7 @@ class RunFile:
         if "snapshot" in self._file:
             self._file.close()
             says = f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own"
-            raise PackingFileError(f"{says}: spectrum, draw, movie, view and export take it.")
-        self._step = self._file[f"{POSITION}/step"]
+            raise PackingFileError(f"{says}: spectrum, draw, view and export take it.")
 
     @classmethod
     def create(
@@ -115,8 +95,6 @@ class RunFile:
 
         Parameters
         ----------
-        path : path
-            The file.
         packing : Packing
             Its radii, masses, upper layer, law, inertia factor and box are those of every frame. It is not
             appended.
@@ -126,12 +104,7 @@ class RunFile:
         Returns
         -------
         RunFile
-            Open for appending, without frames, and not `complete`.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
+            Open for appending, without frames, and not `complete`. Raises OutputError if it cannot be written.
         """
         with new_sealed() as file:
             write_h5md(file)
@@ -139,10 +112,9 @@ class RunFile:
             along = "none" if packing.box_length is None else "periodic"
             disks.create_group("box").attrs.update({"dimension": 3, "boundary": np.array([along, *2 * ["none"]], "S8")})
             position = disks.create_group("position")
-            position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKSUM)
-            position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKSUM)
-            layout: dict[str, Any] = {"maxshape": (None, *shape), "chunks": (1, *shape), **COMPACT}
-            position.create_dataset("value", (0, *shape), np.float64, **layout)
+            for clock, kind in (("step", np.int64), ("time", np.float64)):
+                position.create_dataset(clock, (0,), kind, maxshape=(None,), **CHECKSUM)
+            position.create_dataset("value", (0, *shape), float, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
             # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room
             file["observables/position"] = position
             for name, value in parameters_of(packing).items():
@@ -154,33 +126,19 @@ class RunFile:
 
     def __len__(self) -> int:
         """Number of equilibria; frames of a trajectory do not count."""
-        return int(self._step.shape[0]) - len(self._file.get("faultgouge/trajectory/time", ()))
+        return len(self._file[f"{POSITION}/step"]) - len(self._file.get("faultgouge/trajectory/time", ()))
 
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the root: scene, versions, seed, ranks."""
-        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
+    def __enter__(self) -> RunFile:
+        return self
 
-    def put_attribute(self, name: str, value: str) -> None:
-        """Set an attribute of the root."""
-        with self.change():
-            self._file.attrs[name] = value
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
-    @property
-    def complete(self) -> bool:
-        """Whether the run has come to its end."""
-        return bool(self._file.attrs["complete"])
-
-    @complete.setter
-    def complete(self, value: bool) -> None:
-        if self.complete != value:
-            self._file.attrs["complete"] = value
-            self._unsaved = True
-
-    @property
-    def saved(self) -> bool:
-        """Whether the stored file has all changes."""
-        return not self._unsaved
+    def close(self) -> None:
+        """Save and close the file."""
+        if self._file:
+            self.save()
+            self._file.close()
 
     def save(self) -> None:
         """Write all changes to the file on the disk."""
@@ -203,17 +161,31 @@ class RunFile:
         if outer and monotonic() >= self._next_save:
             self.save()
 
-    def close(self) -> None:
-        """Save and close the file."""
-        if self._file:
-            self.save()
-            self._file.close()
+    @property
+    def saved(self) -> bool:
+        """Whether the stored file has all changes."""
+        return not self._unsaved
 
-    def __enter__(self) -> RunFile:
-        return self
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the root: scene, versions, seed, ranks."""
+        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
 
-    def __exit__(self, *error: object) -> None:
-        self.close()
+    def put_attribute(self, name: str, value: str) -> None:
+        """Set an attribute of the root."""
+        with self.change():
+            self._file.attrs[name] = value
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end."""
+        return bool(self._file.attrs["complete"])
+
+    @complete.setter
+    def complete(self, value: bool) -> None:
+        self._unsaved |= self.complete != value
+        if self._unsaved:
+            self._file.attrs["complete"] = value
 
     def put_checkpoint(self, **arrays: NDArray | int) -> None:
         """Keep the state of a run that is under way, in place of the last one; none for a run that is over."""
@@ -239,117 +211,94 @@ class RunFile:
         return tuple(name for name in self._file["observables"] if name != "position")
 
     def observable(self, name: str) -> NDArray:
-        """An observable in every complete frame, shape (T, ...).
-
-        Raises
-        ------
-        KeyError
-            If the observable is not stored.
-        """
+        """An observable in every frame, shape (T, ...); a KeyError if it is not stored."""
         return self._file["observables"][name]["value"][: len(self)]
 
     def append(self, packing: Packing, **scalars: float) -> None:
-        """Add a frame; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
+        """Add an equilibrium; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
 
         Parameters
         ----------
-        packing : Packing
-            An equilibrium of the disks that the file was created for.
         **scalars : float or int
-            Further observables, such as the force floor or the number of evaluations: the same names in every
-            frame.
+            Further observables, such as the number of evaluations: the same names in every frame.
 
         Raises
         ------
         ValueError
             If disks, law or box are not those of the file, or the names differ from those of earlier frames.
         """
-        known, own, count = self._parameters, parameters_of(packing), len(self)
-        other = [name for name in known | own if not np.array_equal(known.get(name, np.nan), own.get(name, np.nan))]
-        if other:
-            raise ValueError(f"{self.path} was begun for a packing with another {other[0]}.")
-        if count < self._step.shape[0]:
+        known, own, count, c = self._parameters, parameters_of(packing), len(self), packing.contacts
+        for name in known | own:
+            if not np.array_equal(known.get(name, np.nan), own.get(name, np.nan)):
+                raise ValueError(f"{self.path} was begun for a packing with another {name}.")
+        if "trajectory" in self.names_of_series:
             raise ValueError(f"{self.path} has a trajectory, behind which no equilibrium can follow.")
-        c = packing.contacts
         contacts = [each for each in (c.i, c.j, c.slip, c.slip_low) if each is not None]
-        frame = {name: getattr(packing, name) for name in ("angle", "fx", "fy", "residual")}
+        frame = scalars | {name: getattr(packing, name) for name in ("angle", "fx", "fy", "residual")}
         frame |= {"contacts": np.column_stack(contacts)}
         frame |= {} if packing.position_low is None else {"position_low": packing.position_low}
-        for name in frame.keys() & scalars.keys():
-            raise ValueError(f"The name {name} is taken: the packing itself says it.")
-        frame |= scalars
         if count and set(frame) != set(self.observables):
             raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
+        parts = {f"observables/{name}": np.asarray(value) for name, value in frame.items()}
+        parts[POSITION] = np.pad(packing.position, ((0, 0), (0, 1)))
+        if packing.box_length is not None:
+            # twice the height: readers that take every axis as periodic see no neighbours across it
+            height = 2 * (packing.position[:, 1] + packing.radius).max()
+            parts[EDGES] = np.array([packing.box_length, height, 2 * packing.radius.max()])
         with self.change():
-            for name, value in frame.items():
-                self._put(f"observables/{name}", np.asarray(value), count)
-            self._put(POSITION, np.pad(packing.position, ((0, 0), (0, 1))), count)
-            if packing.box_length is not None:
-                # twice the height: readers that take every axis as periodic see no neighbours across it
-                height = 2 * (packing.position[:, 1] + packing.radius).max()
-                self._put(EDGES, np.array([packing.box_length, height, 2 * packing.radius.max()]), count)
+            for name, value in parts.items():
+                if name not in self._file:
+                    self._begin(name, value)
+                _extend(self._file[name]["value"], value[None], count)
             for clock in ("time", "step"):
                 _extend(self._file[f"{POSITION}/{clock}"], np.array([count]), count)
 
-    def _put(self, name: str, value: NDArray, frame: int) -> None:
-        """Write one element of one frame."""
-        if name not in self._file:
-            group = self._file.create_group(name)
-            number = np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64
-            layout: dict[str, Any] = COMPACT if value.ndim else CHECKSUM
-            layout = layout | {
-                "maxshape": (None,) * (value.ndim + 1),
-                "fillvalue": np.nan if number is np.float64 else 0,
-            }
-            chunks = (1, *value.shape) if value.size > 1 else True
-            group.create_dataset("value", (0, *value.shape), number, chunks=chunks, **layout)
-            for clock in ("step", "time"):
-                group[clock] = self._file[f"{POSITION}/{clock}"]
-        _extend(self._file[name]["value"], value[None], frame)
+    def _begin(self, name: str, value: NDArray) -> None:
+        """Make an element of H5MD for values such as one of a frame; contacts may become more."""
+        group, whole = self._file.create_group(name), np.issubdtype(value.dtype, np.integer)
+        layout = dict(COMPACT if value.ndim else CHECKSUM) | {"fillvalue": 0 if whole else np.nan}
+        chunks = (1, *value.shape) if value.size > 1 else True
+        shape, most = (0, *value.shape), (None,) * (value.ndim + 1)
+        group.create_dataset("value", shape, np.int64 if whole else float, maxshape=most, chunks=chunks, **layout)
+        for clock in ("step", "time"):
+            group[clock] = self._file[f"{POSITION}/{clock}"]
+
+    @property
+    def _rows_of_frames(self) -> dict[str, h5py.Dataset]:
+        """What has a row for each frame."""
+        names = [f"observables/{name}/value" for name in self.observables]
+        names += [f"{POSITION}/{name}" for name in ("value", "time", "step")] + [f"{EDGES}/value"]
+        return {name: self._file[name] for name in names if name in self._file}
 
     def cut(self, count: int) -> None:
         """Remove the frames from a number on; of a file without a trajectory."""
-        datasets = [self._file["observables"][name]["value"] for name in self.observables]
-        datasets += [self._file[f"{POSITION}/{name}"] for name in ("value", "time", "step")]
-        datasets += [self._file[EDGES]["value"]] if EDGES in self._file else []
         with self.change():
-            for data in datasets:
+            for data in self._rows_of_frames.values():
                 data.resize(count, axis=0)
 
     def packing(self, frame: int = -1) -> Packing:
-        """The packing of a frame, bitwise as it was stored.
+        """The packing of a frame, bitwise as it was stored; negative numbers count from the end.
 
-        Parameters
-        ----------
-        frame : int
-            Number of the frame; negative ones count from the end.
-
-        Raises
-        ------
-        PackingFileError
-            If there is no such frame.
+        Raises PackingFileError if there is no such frame.
         """
         count = len(self)
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
         frame, given = frame % count, dict(self._parameters)
         seen = {name: self._file[f"observables/{name}/value"][frame] for name in ("contacts", "angle", "fx", "fy")}
-        rows = seen["contacts"][~np.isnan(seen["contacts"][:, 0])]
-        low = self._file.get("observables/position_low")
+        rows = seen.pop("contacts")
+        rows, low = rows[~np.isnan(rows[:, 0])], self._file.get("observables/position_low/value")
         known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
-        with telling(self.path, "is damaged", (ValueError,)):  # numbers that no packing has
+        names = ("radius", "mass", "inertia_factor", "box_length", "drag_time", "spring")
+        with telling(self.path, "is damaged", ValueError):  # numbers that no packing has
             i, j = rows[:, :2].T.astype(np.int64)
+            contacts = Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None)
             return Packing(
-                position=self._file[f"{POSITION}/value"][frame, :, :2],
-                contacts=Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None),
-                law=law_of_parameters(given),
-                top=given["top"].astype(np.bool_),
-                position_low=None if low is None else low["value"][frame],
-                slips_known=known,
-                **{name: seen[name] for name in ("angle", "fx", "fy")},
-                **{name: given[name] for name in ("radius", "mass", "inertia_factor")},
-                **{name: given[name] for name in ("box_length", "drag_time", "spring") if name in given},
-            )
+                position=self._file[f"{POSITION}/value"][frame, :, :2], contacts=contacts, slips_known=known,
+                law=law_of_parameters(given), top=given["top"].astype(bool),
+                position_low=None if low is None else low[frame],
+                **seen, **{name: given[name] for name in names if name in given},
+            )  # fmt: skip
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
         """Add frames of the undamped run that began at the last equilibrium.
@@ -358,48 +307,34 @@ class RunFile:
         ----------
         time : array_like, shape (S,)
             Since the beginning of the run.
-        position : array_like, shape (S, N, 2)
-            Centres, length.
-        position_low : array_like, shape (S, N, 2), optional
-            Their low parts.
+        position, position_low : array_like, shape (S, N, 2)
+            Centres, length, and their low parts if there are any.
         """
-        begin, last, place = self._step.shape[0], len(self) - 1, np.asarray(position, dtype=np.float64)
-        end = begin + len(place)
+        begin, place = len(self._file[f"{POSITION}/step"]), np.pad(position, ((0, 0), (0, 0), (0, 1)))
+        steps = np.arange(begin, begin + len(place))
         with self.change():
-            self.append_series(
-                "trajectory", time=time, **({} if position_low is None else {"position_low": position_low})
-            )
-            rows = {"value": np.pad(place, ((0, 0), (0, 0), (0, 1))), "time": time, "step": np.arange(begin, end)}
-            for name, values in rows.items():
-                _extend(self._file[f"{POSITION}/{name}"], np.asarray(values), begin)
-            for item in self._file["observables"].values():
-                item["value"].resize(end, axis=0)
-            for name in ("observables/fx", "observables/fy", *([EDGES] if EDGES in self._file else [])):
-                data = self._file[name]["value"]
-                data.resize(end, axis=0)
-                data[begin:] = data[last]
+            low = {} if position_low is None else {"position_low": position_low}
+            self.append_series("trajectory", time=time, **low)
+            rows = self._rows_of_frames
+            for data in rows.values():
+                data.resize(begin + len(place), axis=0)
+            for name, values in {"value": place, "time": time, "step": steps}.items():
+                rows[f"{POSITION}/{name}"][begin:] = values
+            for name in {"observables/fx/value", "observables/fy/value", f"{EDGES}/value"} & rows.keys():
+                rows[name][begin:] = rows[name][begin - 1]
 
     def append_series(self, name: str, **columns: ArrayLike) -> None:
         """Add rows to a time series, which begins with the first call.
 
         Parameters
         ----------
-        name : str
-            Name of the series.
         **columns : array_like, shape (R, ...)
-            Columns by name, all of the same length; each call must give the same names.
-
-        Raises
-        ------
-        ValueError
-            If the columns differ in length, or in name from earlier calls.
+            Columns by name, all of the same length; each call must give the same names, or a ValueError says so.
         """
         group = self._file.require_group(f"faultgouge/{name}")
-        arrays = {column: np.asarray(value) for column, value in columns.items()}
-        if not all(array.ndim for array in arrays.values()) or len({len(array) for array in arrays.values()}) != 1:
-            raise ValueError(f"The columns of the series {name} must be lists of one length.")
-        if len(group) and set(group) != set(arrays):
-            raise ValueError(f"The series {name} has the columns {', '.join(group)}, not others.")
+        arrays = {column: np.atleast_1d(value) for column, value in columns.items()}
+        if len({len(array) for array in arrays.values()}) != 1 or (len(group) and set(group) != set(arrays)):
+            raise ValueError(f"The series {name} has columns of one length, and each time the same: {[*group]}.")
         start = _rows(group)
         with self.change():
             for column, array in arrays.items():
@@ -414,13 +349,7 @@ class RunFile:
         return tuple(self._file.get("faultgouge", ()))
 
     def series(self, name: str) -> dict[str, NDArray]:
-        """The columns of a time series by name.
-
-        Raises
-        ------
-        PackingFileError
-            If there is no such series.
-        """
+        """The columns of a time series by name; a PackingFileError if there is no such series."""
         group = self._file.get(f"faultgouge/{name}")
         if group is None:
             raise PackingFileError(f"{self.path} has no series {name}.")
@@ -446,7 +375,7 @@ def _extend(data: h5py.Dataset, rows: NDArray, start: int) -> None:
 
 def _rows(group: h5py.Group) -> int:
     """Rows that every column of a series has: a killed run may have left them uneven."""
-    return min((group[column].shape[0] for column in group), default=0)
+    return min((len(column) for column in group.values()), default=0)
 
 
 def law_parameters(law: MindlinLaw) -> dict[str, float]:
@@ -467,14 +396,3 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
     values |= law_parameters(packing.law) | ({} if packing.slips_known else {"slips_known": 0.0})
     more = {name: getattr(packing, name) for name in ("drag_time", "spring", "box_length")}
     return values | {name: value for name, value in more.items() if value}
-
-
-def write_h5md(file: h5py.File) -> None:
-    """The version of H5MD, and what has written the file; no version where it is not installed."""
-    try:
-        program = version(CREATOR)
-    except PackageNotFoundError:
-        program = ""
-    file.create_group("h5md").attrs["version"] = np.array([1, 1])
-    file.create_group("h5md/author").attrs["name"] = CREATOR
-    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})

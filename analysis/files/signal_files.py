@@ -6,6 +6,7 @@ time of a record counts from its first sample, in seconds.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,8 @@ import numpy as np
 
 from ..errors import PackingFileError
 from ..responses.signals import Signal, SignalError
-from .atomic_write import open_plain
-from .formats.tables import columns_of, lines_of, strip_comments
-
-BEGINNING_BYTES = 4096
-"""Bytes at the beginning of a file that tell a table of numbers from a record."""
+from .atomic_write import read_plain
+from .formats.tables import columns_of, strip_comments
 
 
 def read_signal(path: str | Path, channel: str | None = None) -> Signal:
@@ -37,17 +35,19 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     """
     path = Path(path)
     try:
-        with open_plain(path) as stream:
-            head = stream.read(BEGINNING_BYTES)
+        content = read_plain(path)
     except OSError as error:
         raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
+    # a table is text whose first line that is no comment begins with a number
+    lines = content.decode("ascii", "ignore").replace(",", " ").splitlines()
+    _, words = next(strip_comments(lines, 1), (0, [""]))
     try:
-        if not _is_table(head):
+        if b"\0" in content or not re.match(r"[-+]?\.?\d|[-+]?(nan|inf)", words[0], re.IGNORECASE):
             return of_trace(_record(path, channel))
         if channel is not None:
             raise SignalError("a table of two columns has no channels: leave channel out")
-        rows = strip_comments((line.replace(",", " ") for line in lines_of(path)), 1)
-        return Signal(*columns_of(path, rows, ("time", "value"), "two are needed, time and value", more=False).values())
+        rows, wanted = strip_comments(lines, 1), "two are needed, time and value"
+        return Signal(*columns_of(path, rows, ("time", "value"), wanted, more=False).values())
     except PackingFileError as error:
         raise SignalError(str(error).rstrip(".")) from None
     except SignalError as error:
@@ -57,18 +57,6 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
 def write_table(signal: Signal, path: Path) -> None:
     """Write two columns with all digits, for fix addforce/signal."""
     np.savetxt(path, np.column_stack([signal.time, signal.value]), fmt="%.17g")
-
-
-def _is_table(head: bytes) -> bool:
-    """Whether the first line that is no comment begins with a number."""
-    try:
-        # the last line may be cut off, also within a letter
-        text = head.decode("ascii", "strict" if len(head) < BEGINNING_BYTES else "ignore").replace(",", " ")
-        _, words = next(strip_comments(text.splitlines(), 1))
-        float(words[0])
-    except (ValueError, StopIteration):
-        return False
-    return b"\0" not in head
 
 
 def _record(path: Path, channel: str | None) -> Any:
@@ -81,7 +69,7 @@ def _record(path: Path, channel: str | None) -> Any:
         needs = 'and ObsPy, which reads records, is not installed: pip install "faultgouge[seismic]"'
         raise SignalError(f"it is no table of two columns, {needs}") from None
     except Exception as error:  # whatever the reader of the format raises on a broken file
-        reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
+        reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
         says = f"it is no table of two columns, and ObsPy cannot read it ({reason}): give another file"
         raise SignalError(says) from None
     names = ", ".join(dict.fromkeys(trace.id for trace in traces))

@@ -14,7 +14,7 @@ eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift fi
 from functools import partial
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array, eye_array
+from scipy.sparse import csc_array, diags_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..factors.sparse_lu import DIAGONAL_PIVOT, negative_pivots, symmetric_lu
@@ -22,7 +22,6 @@ from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import (
     SAFETY,
-    active_coordinates,
     imbalance,
     is_negative,
     operator_rounding,
@@ -64,18 +63,6 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         found = nearest_modes(packing, -0.5 * bound, count)
     zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
     return np.sort(found.values[is_negative(found.values, found.overlap, rounding, zero)].real)
-
-
-def surely_positive(matrix: csr_array) -> bool:
-    """Whether no eigenvalue of an operator is negative, as its symmetric part is positive definite.
-
-    Parameters
-    ----------
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        Zero rows are left out.
-    """
-    active = active_coordinates(matrix)
-    return _is_positive(csc_array(0.5 * (matrix + matrix.T))[active][:, active], 0.0)
 
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
@@ -44,58 +45,70 @@ class Gaps:
         return particle_rows(configuration, (self.i, self.j), np.array([closing, -closing]))
 
 
-def gaps_of(configuration: Configuration) -> Gaps:
-    """Pairs of particles, and particles and planes, that do not touch and are nearer than the largest overlap."""
-    largest = float(configuration.contacts.overlap.max(initial=0.0))
-    place = np.zeros((len(configuration), 3))
-    place[:, : configuration.dimension] = configuration.position
-    parts = [_between_particles(configuration, place, largest), _at_planes(configuration, place, largest)]
-    i, j, normal, gap = (np.concatenate(each) for each in zip(*parts, strict=True))
-    near = (gap > 0) & (gap < largest) & ~_touch(configuration, i, j)
-    return Gaps(i[near], j[near], normal[near], gap[near])
+def near_pairs(
+    position: Floats, radius: Floats, box: Floats, periodic: ArrayLike, apart: float = 0.0
+) -> tuple[Indices, Indices, Floats]:
+    """Pairs of spheres whose surfaces are nearer than a distance, through the sides of the box, too.
 
+    The larger of two, or the later one, finds the other. A sphere that is near two images of another makes two pairs.
 
-def _touch(configuration: Configuration, i: Indices, j: Indices) -> np.ndarray:
-    """Which pairs of particles have a contact already, as cohesive ones that are apart do."""
-    count, c = len(configuration), configuration.contacts
-    pairs, contacts = (np.minimum(a, b) * count + np.maximum(a, b) for a, b in ((i, j), (c.i, c.j)))
-    return np.isin(pairs, contacts[~c.wall]) & (j != WALL)
+    Parameters
+    ----------
+    position, radius : ndarray, shapes (N, 3) and (N,)
+        Centres and radii, length.
+    box : ndarray, shape (3, 3)
+        Edges in rows, with `periodic` of each.
+    apart : float
+        The distance, length; 0 for those that overlap.
 
-
-def _between_particles(c: Configuration, place: Floats, largest: float) -> tuple[Indices, Indices, Floats, Floats]:
-    """Pairs of particles, through the sides of the box, too: the larger of two, or the later one, finds the other."""
+    Returns
+    -------
+    i, j : ndarray of int, shape (C,)
+        Ascending, i < j.
+    branch : ndarray, shape (C, 3)
+        From j to i, length.
+    """
     from scipy.spatial import cKDTree  # which takes as long to import as all of `scipy.sparse`
 
-    tree, far = cKDTree(place), 2 * c.radius + largest
-    low, high = place.min(axis=0) - far.max(), place.max(axis=0) + far.max()
-    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))]
-    for image in product(*((-1, 0, 1) if each else (0,) for each in c.periodic)):
-        shifted = place + np.array(image) @ c.box
+    tree, far = cKDTree(position), 2 * radius + apart
+    low, high = position.min(axis=0) - far.max(), position.max(axis=0) + far.max()
+    found = [np.zeros((0, 2), int)], [np.zeros((0, 3))]
+    for image in product(*((-1, 0, 1) if each else (0,) for each in np.asarray(periodic))):
+        shifted = position + np.array(image) @ box
         inside = np.flatnonzero(np.all((shifted >= low) & (shifted <= high), axis=1))
-        if not len(inside):
-            continue
-        near = tree.query_ball_point(shifted[inside], far[inside])
-        j = np.repeat(inside, [len(each) for each in near])
-        i = np.concatenate([np.zeros(0, int), *(np.array(each, int) for each in near)])
-        once = (c.radius[i] < c.radius[j]) | ((c.radius[i] == c.radius[j]) & (i < j))
-        found.append((i[once], j[once], (place[i] - shifted[j])[once]))
-    i, j, branch = (np.concatenate(each) for each in zip(*found, strict=True))
+        if len(inside):
+            near = tree.query_ball_point(shifted[inside], far[inside])
+            j = np.repeat(inside, [len(each) for each in near])
+            i = np.concatenate([np.array(each, int) for each in near])
+            once = (radius[i] < radius[j]) | ((radius[i] == radius[j]) & (i < j))
+            found[0].append(np.column_stack([i, j])[once])
+            found[1].append((position[i] - shifted[j])[once])
+    pairs, branch = np.concatenate(found[0]), np.concatenate(found[1])
+    near = np.linalg.norm(branch, axis=1) < radius[pairs].sum(axis=1) + apart
+    back = (pairs[:, 0] > pairs[:, 1])[near]
+    pairs, branch = np.sort(pairs[near], axis=1), np.where(back[:, None], -branch[near], branch[near])
+    order = np.lexsort(pairs.T[::-1])
+    return pairs[order, 0], pairs[order, 1], branch[order]
+
+
+def gaps_of(configuration: Configuration) -> Gaps:
+    """Pairs of particles, and particles and planes, that do not touch and are nearer than the largest overlap."""
+    c, radius, count = configuration.contacts, configuration.radius, len(configuration)
+    largest = float(c.overlap.max(initial=0.0))
+    place = np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
+    i, j, branch = near_pairs(place, radius, configuration.box, configuration.periodic, largest)
     distance = np.linalg.norm(branch, axis=1)
-    normal = branch / np.maximum(distance, np.finfo(float).tiny)[:, None]
-    return i, j, normal, distance - c.radius[i] - c.radius[j]
-
-
-def _at_planes(c: Configuration, place: Floats, largest: float) -> tuple[Indices, Indices, Floats, Floats]:
-    walls = c.contacts.chosen(c.contacts.wall)
-    surface = np.einsum("ca,ca->c", place[walls.i], walls.normal) - c.radius[walls.i] + walls.overlap
-    scale = float(c.radius.mean())
-    _, which = np.unique(
-        np.round(np.column_stack([walls.normal, surface / scale]) / SAME_PLANE), axis=0, return_index=True
-    )
-    found = [(np.zeros(0, int), np.zeros((0, 3)), np.zeros(0))]
-    for k in which:
-        height = place @ walls.normal[k] - surface[k] - c.radius
+    gap, normal = distance - radius[i] - radius[j], branch / np.maximum(distance, np.finfo(float).tiny)[:, None]
+    # cohesive particles that are apart have a contact already
+    known = np.minimum(c.i, c.j) * count + np.maximum(c.i, c.j)
+    near = (gap > 0) & (gap < largest) & ~np.isin(i * count + j, known[~c.wall])
+    found = [(i[near], j[near], normal[near], gap[near])]
+    walls = c.chosen(c.wall)
+    surface = np.einsum("ca,ca->c", place[walls.i], walls.normal) - radius[walls.i] + walls.overlap
+    scale = float(radius.mean())
+    planes = np.round(np.column_stack([walls.normal, surface / scale]) / SAME_PLANE)
+    for k in np.unique(planes, axis=0, return_index=True)[1]:
+        height = place @ walls.normal[k] - surface[k] - radius
         i = np.flatnonzero((height > SAME_PLANE * scale) & (height < largest))
-        found.append((i, np.tile(walls.normal[k], (len(i), 1)), height[i]))
-    i, normal, gap = (np.concatenate(each) for each in zip(*found, strict=True))
-    return i, np.full(len(i), WALL), normal, gap
+        found.append((i, np.full(len(i), WALL), np.tile(walls.normal[k], (len(i), 1)), height[i]))
+    return Gaps(*(np.concatenate(each) for each in zip(*found, strict=True)))

@@ -51,17 +51,23 @@ class Contacts:
             raise ValueError(f"Disk {first[first == second][0]} is listed as touching itself.")
         slips = floats("slip", slip, first.shape)
         low = None if slip_low is None else floats("slip_low", slip_low, first.shape)
-        if not _canonical(first, second):
-            first, second, order = _sort_contacts(first, second)
-            slips, low = slips[order], None if low is None else low[order]
-        set_frozen(self, i=first, j=second, slip=slips, slip_low=low)
+        floor = second == FLOOR
+        first, second = (
+            np.where(floor, first, np.minimum(first, second)), np.where(floor, FLOOR, np.maximum(first, second))
+        )  # fmt: skip
+        order = np.lexsort((second, first, floor))
+        first, second = first[order], second[order]
+        twice = np.flatnonzero((np.diff(first) == 0) & (np.diff(second) == 0))
+        if len(twice):
+            raise ValueError(f"The contact ({first[twice[0]]}, {second[twice[0]]}) is listed twice.")
+        set_frozen(self, i=first, j=second, slip=slips[order], slip_low=None if low is None else low[order])
 
     def __len__(self) -> int:
         return len(self.i)
 
     def __eq__(self, other: object) -> bool:
         """Whether partners and slips are the same to the bit."""
-        return same_bits(self, other) if isinstance(other, Contacts) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.slip.tobytes()))
@@ -78,24 +84,3 @@ class Contacts:
         """The same contacts with other slips in the same order; length, shape (C,)."""
         low = None if slip_low is None else floats("slip_low", slip_low, self.i.shape)
         return derive_frozen(self, slip=floats("slip", slip, self.i.shape), slip_low=low)
-
-
-def _canonical(i: Indices, j: Indices) -> bool:
-    """Whether contacts are in the order of storage, and none is listed twice."""
-    floor, disks = j == FLOOR, int(i.max(initial=0)) + int(j.max(initial=0)) + 2
-    place = np.where(floor, disks * disks, disks * i + j) + np.where(floor, i, 0)
-    return bool(np.all((i < j) | floor) and np.all(place[1:] > place[:-1]))
-
-
-def _sort_contacts(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
-    """i and j in the order of storage, and the place that each contact had before."""
-    floor = j == FLOOR
-    first = np.where(floor, i, np.minimum(i, j))
-    second = np.where(floor, FLOOR, np.maximum(i, j))
-    order = np.lexsort((second, first, floor))
-    first, second = first[order], second[order]
-    twice = (np.diff(first) == 0) & (np.diff(second) == 0)
-    if np.any(twice):
-        k = np.flatnonzero(twice)[0]
-        raise ValueError(f"The contact ({first[k]}, {second[k]}) is listed twice.")
-    return first, second, order

@@ -284,11 +284,6 @@ class MindlinLaw:
         """The inverse of `normal_force`: overlap (force / kn)^(1/p) of a contact that carries a force, length."""
         return float((force / self.kn) ** (1 / self.exponent))
 
-    def stiffness_scale(self, force: float) -> float:
-        """Force over overlap, kn^(1/p) force^((p-1)/p), of a contact that carries a force; force / length."""
-        p = self.exponent
-        return float(self.kn ** (1 / p) * force ** ((p - 1) / p))
-
     def tangential_force(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
         """Tangential force f_t along tau, force; beyond the slip limit it is Coulomb's bound.
 

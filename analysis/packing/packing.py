@@ -36,7 +36,7 @@ from ..arrays import (
     set_frozen,
 )
 from ..assembly import spring_of_layer
-from ..configuration import Configuration
+from ..configuration import BY_DEFAULT, Configuration
 from ..counted import counted
 from ..errors import BadInputError
 from .compensated import DoubleDouble
@@ -47,7 +47,7 @@ from .law import Derivatives, MindlinLaw
 from .linearise import linearise_contacts
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Packing:
     """A configuration of disks with its contacts, law and load. Arrays are copied and made read-only.
 
@@ -95,67 +95,44 @@ class Packing:
     radius: Floats
     contacts: Contacts
     law: MindlinLaw
-    angle: Floats
-    mass: Floats
-    inertia_factor: float
-    box_length: float | None
-    top: NDArray[np.bool_]
-    fx: float
-    fy: float
-    position_low: Floats | None
-    drag_time: float | None
-    slips_known: bool
-    spring: float
+    angle: Floats = BY_DEFAULT
+    mass: Floats = BY_DEFAULT
+    inertia_factor: float = 1.0
+    box_length: float | None = None
+    top: NDArray[np.bool_] = BY_DEFAULT
+    fx: float = 0.0
+    fy: float = 0.0
+    position_low: Floats | None = None
+    drag_time: float | None = None
+    slips_known: bool = True
+    spring: float = 0.0
 
-    def __init__(
-        self,
-        *,
-        position: ArrayLike,
-        radius: ArrayLike,
-        contacts: Contacts,
-        law: MindlinLaw,
-        angle: ArrayLike | None = None,
-        mass: ArrayLike | None = None,
-        inertia_factor: float = 1.0,
-        box_length: float | None = None,
-        top: ArrayLike | None = None,
-        fx: float = 0.0,
-        fy: float = 0.0,
-        position_low: ArrayLike | None = None,
-        drag_time: float | None = None,
-        slips_known: bool = True,
-        spring: float = 0.0,
-    ) -> None:
-        n = len(np.atleast_1d(np.asarray(radius)))
+    def __post_init__(self) -> None:
+        n = np.size(self.radius)
         if n == 0:
             raise ValueError("A packing needs at least one disk.")
-        set_frozen(
-            self,
-            position=floats("position", position, (n, 2)),
-            radius=positive_each("radius", floats("radius", radius, (n,))),
-            contacts=contacts,
-            law=law,
-            angle=floats("angle", np.zeros(n) if angle is None else angle, (n,)),
-            mass=positive_each("mass", floats("mass", np.ones(n) if mass is None else mass, (n,))),
-            inertia_factor=number("inertia_factor", inertia_factor, positive=True),
-            box_length=None if box_length is None else number("box_length", box_length, positive=True),
-            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
-            fx=number("fx", fx),
-            fy=number("fy", fy),
-            position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
-            drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
-            slips_known=bool(slips_known),
-            spring=number("spring", spring),
-        )
+        given = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name, value in {"angle": np.zeros(n), "mass": np.ones(n), "top": np.zeros(n, bool)}.items():
+            given[name] = value if given[name] is None else given[name]
+        shapes = {"position": (n, 2), "radius": (n,), "angle": (n,), "mass": (n,), "position_low": (n, 2)}
+        values: dict[str, object] = {
+            name: floats(name, given[name], shape) for name, shape in shapes.items() if given[name] is not None
+        }
+        for name in ("inertia_factor", "box_length", "drag_time", "fx", "fy", "spring"):
+            if given[name] is not None:
+                values[name] = number(name, given[name], positive=name not in ("fx", "fy", "spring"))
+        set_frozen(self, **values, top=booleans("top", given["top"], n), slips_known=bool(self.slips_known))
+        positive_each("radius", self.radius)
+        positive_each("mass", self.mass)
         check_box(self.radius, self.box_length)
-        _check_partners(contacts, n)
+        _check_partners(self.contacts, n)
 
     def __len__(self) -> int:
         return len(self.radius)
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit, low parts included."""
-        return same_bits(self, other) if isinstance(other, Packing) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.fx, self.position.tobytes()))
@@ -173,6 +150,20 @@ class Packing:
     dimension = 2
     axes = 3
     """Coordinates of each disk: x, y and R theta."""
+
+    planes = ((1, 1.0, 0.0),)
+    """The floor: its axis, the sign along it of its inner side, and its place; as of a Configuration."""
+
+    @property
+    def in_words(self) -> str:
+        """Load, and how many disks."""
+        return f"F_x = {self.fx:g}, F_y = {self.fy:g}: {counted(len(self), 'disk')}"
+
+    @property
+    def slip_share(self) -> Floats:
+        """|s|/t* of each contact, shape (C,); zero without friction."""
+        limit = self.law.slip_limit(self.geometry.overlap)
+        return np.divide(np.abs(self.contacts.slip), limit, out=np.zeros_like(limit), where=limit > 0)
 
     @property
     def coordinates(self) -> int:
@@ -295,8 +286,16 @@ class Packing:
 
         For a compensated packing the sum is in numpy's long doubles, which have 64 bits on x86.
         """
-        i, j, pair = self.contacts.i, self.contacts.j, ~self.contacts.floor
-        fn, ft, normal = self._contact_forces
+        c, pair = self.contacts, ~self.contacts.floor
+        i, j, fn, ft, normal = c.i, c.j, self.normal_force, self.tangential_force, self.geometry.normal
+        if self.compensated:
+            _, branch, overlap = self._exact_geometry
+            delta, between = np.add(*overlap, dtype=np.longdouble), np.add(*branch, dtype=np.longdouble)
+            slip = np.add(c.slip, 0.0 if c.slip_low is None else c.slip_low, dtype=np.longdouble)
+            distance = np.sqrt(np.sum(between * between, axis=1))
+            distance[c.floor] = between[c.floor, 1]
+            fn, ft = self.law.normal_force(delta), self.law.tangential_force(delta, slip)
+            normal = between / distance[:, None]
         on_i = np.column_stack([fn * normal[:, 0] - ft * normal[:, 1], fn * normal[:, 1] + ft * normal[:, 0]])
         total = np.zeros((3, len(self)), fn.dtype)
         total[0, self.top] = self.fx
@@ -307,21 +306,6 @@ class Packing:
         np.subtract.at(total[2], i, ft)
         np.subtract.at(total[2], j[pair], ft[pair])
         return frozen(total.ravel().astype(np.float64))
-
-    @property
-    def _contact_forces(self) -> tuple[NDArray, NDArray, NDArray]:
-        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep the low parts."""
-        if not self.compensated:
-            return self.normal_force, self.tangential_force, self.geometry.normal
-        _, branch, overlap = self._exact_geometry
-        delta = np.add(*overlap, dtype=np.longdouble)
-        low = self.contacts.slip_low
-        slip = np.add(self.contacts.slip, 0.0 if low is None else low, dtype=np.longdouble)
-        between = np.add(*branch, dtype=np.longdouble)
-        distance = np.sqrt(np.sum(between * between, axis=1))
-        distance[self.contacts.floor] = between[self.contacts.floor, 1]
-        normal = between / distance[:, None]
-        return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
 
     def moved(
         self,
@@ -377,11 +361,8 @@ class Packing:
         kept = self.normal_force > least
         if np.all(kept):
             return self
-        low = self.contacts.slip_low
-        contacts = Contacts(
-            self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept], None if low is None else low[kept]
-        )
-        return replace(self, contacts=contacts)
+        c, low = self.contacts, self.contacts.slip_low
+        return replace(self, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept], None if low is None else low[kept]))
 
     @property
     def smallest_overlap(self) -> float:

@@ -36,7 +36,7 @@ def solid_fraction(packing: Packing | Configuration) -> float:
     BadInputError
         If a Configuration is not periodic along an axis: nothing says where it ends there.
     """
-    if not isinstance(packing, Packing):
+    if packing.law is None:
         return _solid_in_box(packing.configuration)
     heights = packing.position[:, 1]
     return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))
@@ -60,7 +60,7 @@ def solid_fraction_below_top(packing: Packing) -> float:
     return _solid_below(packing, float((packing.position[:, 1] + packing.radius).max()))
 
 
-def _solid_below(packing: Packing, height: float) -> float:
+def _solid_below(packing: Packing | Configuration, height: float) -> float:
     x, radius = packing.position[:, 0], packing.radius
     width = packing.box_length or float((x + radius).max() - (x - radius).min())
     above = np.clip((height - packing.position[:, 1]) / radius, -1.0, 1.0)  # of the cut, from the centre

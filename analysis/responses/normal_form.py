@@ -112,11 +112,7 @@ class NormalForm:
         """
         mean = 0.5 * (block[0, 0] + block[1, 1])
         # Traceless part: ((-c, k), (k, c)) + q ((0, 1), (-1, 0)); c = p cos 2a, k = -p sin 2a.
-        c, k, q = (
-            0.5 * (block[1, 1] - block[0, 0]),
-            0.5 * (block[0, 1] + block[1, 0]),
-            0.5 * (block[0, 1] - block[1, 0]),
-        )
+        c, (k, q) = 0.5 * (block[1, 1] - block[0, 0]), 0.5 * (block[0, 1] + np.array([1, -1]) * block[1, 0])
         p, angle = np.hypot(c, k), 0.5 * np.arctan2(-k, c)
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         turn[:, 1] *= 1.0 if q >= 0 else -1.0
@@ -168,13 +164,13 @@ class NormalForm:
 
     def _solution(self, t: Floats, gamma: float) -> Floats:
         """The motion in the unit of time of the equations."""
-        s, d = self._rates(gamma)
+        r, s, d = self._rates(gamma)
         # The motion is exp(-gamma t) (cos(St) + gamma sin(St)/S), each as its parts along 1 and along N.
         # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
         slow, q = np.cos(d * t), t / (2 * s) * np.sinc(d * t / np.pi)
         fast, turn, decay = np.cos(s * t), np.sin(s * t), np.exp(-gamma * t)
         # S^-1 = (s - N/2s)/(s^2 - d^2), and N^2 = r^2.
-        norm, r2 = s * s - d * d, self._split**2
+        norm, r2 = s * s - d * d, r**2
         sine = (turn * slow * s - fast * q * r2 / (2 * s)) / norm, (fast * q * s - turn * slow / (2 * s)) / norm
         cosine = decay * fast * slow, -decay * turn * q
         even, odd = (c.real + gamma * (decay * s).real for c, s in zip(cosine, sine, strict=True))
@@ -206,7 +202,7 @@ class NormalForm:
         from scipy.optimize import minimize_scalar
 
         gamma = self._gamma(damping_time)
-        s, d = self._rates(gamma)
+        _, s, d = self._rates(gamma)
         if not (s.imag == 0 and s.real > 0):
             raise ValueError(f"damping_time = {damping_time} damps the oscillation itself away: there is no beat.")
         if self.epsilon <= 0:
@@ -245,17 +241,11 @@ class NormalForm:
         bounds = 0.3 * self.tau_d, 10 * self.tau_d
         return float(brentq(lambda tau: self.amplitude(tau) - 0.5 * full, *bounds, rtol=1e-9))
 
-    @property
-    def _split(self) -> complex | float:
-        """r, imaginary where the pair is complex."""
-        squared = self.epsilon * (2 - self.epsilon)
-        return self.delta * np.emath.sqrt(squared)
-
-    def _rates(self, gamma: float) -> tuple[complex, complex]:
-        """s and d of the damped frequencies."""
-        r, c = self._split, 1 - gamma**2
+    def _rates(self, gamma: float) -> tuple[complex, complex, complex]:
+        """r, imaginary where the pair is complex, and s and d of the damped frequencies."""
+        r, c = self.delta * np.emath.sqrt(self.epsilon * (2 - self.epsilon)), 1 - gamma**2
         s = complex(0.5 * (np.emath.sqrt(c + r) + np.emath.sqrt(c - r)))
-        return s, complex(0.5 * r / s)
+        return r, s, complex(0.5 * r / s)
 
     def _gamma(self, damping_time: float | None) -> float:
         """gamma = 1/2 tau, in the unit of time of the equations."""

@@ -1,36 +1,53 @@
-r"""Linear response of a packing to a force and to a displacement, exact at all times.
+r"""Linear response of a packing to a force, to a displacement and to an impulse.
 
 Small motion about an equilibrium, under a force f on the coordinates q and the dissipation C, obeys
 
 .. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
 
-Without dissipation the motion is a function of one matrix, that of one oscillator
-(:mod:`~faultgouge.analysis.responses.oscillator`).
+**In time** (`linear_response`). The cosine is one more oscillator, :math:`\ddot y = -\omega^2 y` from y = 1 at rest, so
+that the motion is that of one system without a force, :math:`\ddot z = -B z - G \dot z`, :math:`z = (M^{1/2} q, y)`. A
+step is the exponential of the first-order system (C. F. Van Loan, IEEE Trans. Autom. Control 23, 395, 1978). Velocity
+Verlet of a step dt has a matrix of its own in place of the exponential,
 
-**Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
-then that of the first-order system of :mod:`~faultgouge.analysis.motion.motion`, whose eigenvalues s give
-:math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
-finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
-(`transfer` in :mod:`~faultgouge.analysis.responses.forcing`).
+.. math:: \begin{pmatrix} 1 - \tfrac12 B\,dt^2 & dt \\ -B\,(1 - \tfrac14 B\,dt^2)\,dt & 1 - \tfrac12 B\,dt^2
+    \end{pmatrix},
 
-Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
-(:mod:`~faultgouge.analysis.responses.matrix_functions`).
+with :math:`(2/dt) \sin\tfrac12 \omega\,dt` in place of :math:`\omega`. No matrix is diagonalised, so that nothing is
+lost at a coalescence of eigenvalues or in resonance.
+
+**In frequency** (`impulse_response`). One number matters for triggering: the mean velocity v of the upper layer, on
+which friction depends. A unit impulse gives :math:`v(t) = \sum_k c_k e^{s_k t}`, with the rates s_k of all motions
+(without damping :math:`\pm i \sqrt\lambda`) and weights c_k from their right and left vectors. The force
+cos(omega t), from rest at t = 0, gives
+
+.. math:: v(t) = \mathrm{Re} \sum_k c_k \frac{e^{i\omega t} - e^{s_k t}}{i\omega - s_k} ,
+
+a stationary part, which is the transfer function :math:`H(\omega) = \sum_k c_k / (i\omega - s_k)`, and a transient,
+which never decays in an undamped packing. Towards the onset the weights of the transient grow with the condition of the
+pair: this is the giant sensitivity. The largest |v| up to a given time decides whether friction weakens, and is
+proportional to the amplitude.
 
 Coordinates on which no force acts, those of rattlers, are held fixed.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eig, expm
 
+from ..arrays import Complexes, Floats
 from ..errors import BadInputError
 from ..has_configuration import HasConfiguration
 from ..motion.motion import Motion
-from ..packing.packing import Floats
-from .matrix_functions import BlockDiagonal, first_order
-from .oscillator import Oscillator, driven_motion, released_motion
+from ..packing.packing import Packing
+
+LOOKS_A_PERIOD, LOOKS_AT_ONCE = 20, 2000
+"""Times a period of the fastest motion at which the largest velocity is looked for, and times that are kept at once."""
+
+RESONANCE_WIDTH = 1e-9
+"""Relative distance of a frequency from that of a motion below which the quotient of differences would lose all its
+digits. Such a frequency is moved by twice as much: a part in a million of the response after t = 1e3/omega."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,77 +85,6 @@ class Response:
         return self.velocity[:, : len(self.top)][:, self.top].mean(axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class LinearMotion:
-    """The linearised motion of a packing, decomposed once for any number of forces, starts and times.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium.
-    system : Motion
-        Its operators.
-    modes : BlockDiagonal
-        Of A without dissipation, of the first-order system with it.
-    """
-
-    packing: HasConfiguration
-    system: Motion
-    modes: BlockDiagonal
-
-    @classmethod
-    def of(cls, packing: HasConfiguration) -> "LinearMotion":
-        """Decompose a packing; errors as of `linear_response`."""
-        system = Motion.of(packing)
-        if packing.damped:
-            return cls(packing, system, BlockDiagonal.of(system.first_order, first_order))
-        return cls(packing, system, BlockDiagonal.of(system.stiffness.toarray()))
-
-    @property
-    def dissipative(self) -> bool:
-        """Whether the packing has dashpots or drag."""
-        return self.modes.reach is first_order
-
-    def response(
-        self,
-        times: ArrayLike,
-        *,
-        force: ArrayLike | None = None,
-        omega: float = 0.0,
-        initial: ArrayLike | None = None,
-        dt: float | None = None,
-    ) -> Response:
-        """Motion from rest; parameters and errors as of `linear_response`."""
-        if dt is not None and self.dissipative:
-            raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt without dissipation.")
-        oscillator, time = Oscillator(float(omega), dt), _times(times, dt)
-        active, root, count = self.system.active, self.system.root_mass, self.packing.coordinates
-        displacement, velocity = np.zeros((2, len(time), count))
-        for given, name, scale in ((force, "force", 1 / root), (initial, "initial", root)):
-            if given is None:
-                continue
-            vector = coordinates(self.packing, name, given)
-            x, v = self._motion(oscillator, name == "force", vector[active] * scale, time, np.diag(1 / root))
-            displacement[:, active] += x
-            velocity[:, active] += v
-        return Response(time, displacement, velocity, self.packing.top, self.packing.dimension)
-
-    def _motion(
-        self, oscillator: Oscillator, forced: bool, vector: Floats, time: Floats, observed: Floats
-    ) -> tuple[Floats, Floats]:
-        """Displacement and velocity of rows of the mass-weighted coordinates, under a force or from a displacement."""
-        if not self.dissipative:
-            second = oscillator.forced_motion if forced else oscillator.free_motion
-            displacement, velocity = self.modes.apply(second, time, vector, observed)
-            return displacement.real, velocity.real
-        norm, rest, size = self.system.energy_norm, np.zeros_like(vector), len(observed)
-        start = np.concatenate([rest, vector] if forced else [norm.weight @ vector, rest])
-        rows = np.block([[observed @ norm.unweight, 0 * observed], [0 * observed, observed]])
-        first = partial(driven_motion, oscillator.omega) if forced else released_motion
-        (value,) = self.modes.apply(first, time, start, rows)
-        return value[:, :size].real, value[:, size:].real
-
-
 def linear_response(
     packing: HasConfiguration,
     times: ArrayLike,
@@ -150,14 +96,12 @@ def linear_response(
 ) -> Response:
     """Compute the motion of the linearised packing from rest, with its dashpots and drag.
 
-    To compute many motions of one packing, decompose it once: :class:`LinearMotion`.
-
     Parameters
     ----------
     packing : Packing
         The equilibrium.
     times : array_like, shape (T,)
-        Times, in any order, not negative.
+        Times, in any order, not negative; quickest where they are equally spaced.
     force : array_like, shape (3N,), or (6N,) of spheres, optional
         Amplitude f of the force f cos(omega t) on (x.., y.., R theta..), as from `layer_force`; none by default.
     omega : float
@@ -176,10 +120,57 @@ def linear_response(
     ValueError
         If a shape does not fit, a time is negative, a step is not positive or is given with dissipation, or the
         times are not multiples of the step.
-    numpy.linalg.LinAlgError
-        If more than two eigenvalues coalesce.
     """
-    return LinearMotion.of(packing).response(times, force=force, omega=omega, initial=initial, dt=dt)
+    time = np.array(times, dtype=np.float64)
+    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(time < 0):
+        raise ValueError("The times of a response must be a list of finite numbers, none of them negative.")
+    if dt is not None and not 0 < dt < np.inf:
+        raise ValueError(f"dt = {dt} must be positive and finite.")
+    if dt is not None and packing.damped:
+        raise ValueError("The dispersion of velocity Verlet is that of undamped runs: give dt without dissipation.")
+    instants, where = np.unique(time, return_inverse=True)
+    gaps = np.diff(instants, prepend=0.0)
+    unit = dt or gaps[gaps > 0].min(initial=np.inf)
+    # a part in a million of a step is far above the rounding of times that were printed or summed
+    steps = np.round(gaps / unit, 6)
+    even = bool(np.all(steps == np.round(steps)))
+    if dt is not None and not even:
+        raise ValueError(f"The times of a run with the step {dt:g} are multiples of it.")
+    system = Motion.of(packing)
+    active, root, size = system.active, system.root_mass, len(system.active)
+    b, start = np.zeros((size + 1, size + 1)), np.zeros(2 * size + 2)
+    b[:size, :size], start[size] = system.stiffness.toarray(), 1.0
+    b[size, size] = omega**2 if dt is None else (2 / dt * np.sin(0.5 * omega * dt)) ** 2
+    if force is not None:
+        b[:size, size] = -_coordinates(packing, "force", force)[active] / root
+    if initial is not None:
+        start[:size] = _coordinates(packing, "initial", initial)[active] * root
+    # velocities in units in which they are as large as displacements
+    speed, one = float(np.sqrt(np.abs(b).max())) or 1.0, np.eye(size + 1)
+    damping = np.zeros_like(b)
+    damping[:size, :size] = system.damping.toarray()
+    first_order = np.block([[0 * one, speed * one], [-b / speed, -damping]])
+    powers, states, by_gap = [], np.empty((len(instants), len(start))), dict[float, Floats]()
+    if dt is not None:
+        half = one - 0.5 * dt**2 * b
+        powers = [np.block([[half, speed * dt * one], [-dt / speed * b @ (one - 0.25 * dt**2 * b), half]])]
+    elif even and time.any():
+        powers = [expm(instants[-1] / steps.sum() * first_order)]
+    with np.errstate(over="ignore", invalid="ignore"):  # of motions that grow for long
+        for k, ahead in enumerate(steps.tolist()):
+            if not even:
+                if ahead not in by_gap:  # equal gaps differ by rounding
+                    by_gap[ahead] = expm(gaps[steps == ahead].mean() * first_order)
+                start = by_gap[ahead] @ start
+            for bit in range(int(ahead).bit_length() if even else 0):
+                if bit == len(powers):
+                    powers.append(powers[-1] @ powers[-1])
+                start = powers[bit] @ start if int(ahead) >> bit & 1 else start
+            states[k] = start
+    displacement, velocity = np.zeros((2, len(time), packing.coordinates))
+    displacement[:, active] = states[where, :size] / root
+    velocity[:, active] = speed * states[where, size + 1 : 2 * size + 1] / root
+    return Response(time, displacement, velocity, packing.top, packing.dimension)
 
 
 def layer_force(packing: HasConfiguration, amplitude: float) -> Floats:
@@ -212,22 +203,103 @@ def layer_force(packing: HasConfiguration, amplitude: float) -> Floats:
     return force
 
 
-def coordinates(packing: HasConfiguration, name: str, values: ArrayLike) -> Floats:
-    """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
+def floor_force(packing: Packing) -> Floats:
+    """The force -m along x on every disk, (x.., y.., R theta..), shape (3N,): in the frame of a floor with a unit
+    acceleration."""
+    return np.concatenate([-packing.mass, np.zeros(2 * len(packing))])
+
+
+def _coordinates(packing: HasConfiguration, name: str, values: ArrayLike) -> Floats:
+    """Numbers of all coordinates; a ValueError if they have another shape."""
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (packing.coordinates,):
         raise ValueError(f"{name} has shape {vector.shape}; {(packing.coordinates,)} is needed.")
     return vector
 
 
-def _times(times: ArrayLike, dt: float | None) -> Floats:
-    time = np.array(times, dtype=np.float64)
-    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(time < 0):
-        raise ValueError("The times of a response must be a list of finite numbers, none of them negative.")
-    if dt is None:
-        return time
-    steps = np.round(time / dt)
-    # Times of a run are multiples of dt, printed or summed: a part in a million of a step is far above rounding.
-    if np.any(np.abs(time / dt - steps) > 1e-6 * np.maximum(1.0, steps * 1e-6)):
-        raise ValueError(f"The times of a run with the step {dt:g} are multiples of it.")
-    return steps * dt
+@dataclass(frozen=True, eq=False)
+class ImpulseResponse:
+    """Velocity of the upper layer after a unit impulse: v(t) = sum of c_k exp(s_k t).
+
+    Attributes
+    ----------
+    rate : ndarray of complex, shape (n,)
+        s_k, 1 / time: growth and frequency of a motion.
+    weight : ndarray of complex, shape (n,)
+        c_k, velocity / impulse.
+    """
+
+    rate: Complexes
+    weight: Complexes
+
+    def parts(self, omega: ArrayLike) -> tuple[Floats, Complexes]:
+        """The frequencies, off resonance, and c_k/(i omega - s_k), of the shape of omega and (n,) at its end."""
+        omegas, least = np.array(omega, dtype=np.float64)[..., None], RESONANCE_WIDTH * np.abs(self.rate)
+        hit = np.abs(1j * omegas - self.rate) < least
+        omegas = omegas + 2 * np.max(np.where(hit, least, 0.0), axis=-1, keepdims=True)
+        return omegas[..., 0], self.weight / (1j * omegas - self.rate)
+
+    def transfer(self, omega: ArrayLike) -> Complexes:
+        """H(omega): amplitude and phase of the stationary velocity under the force cos(omega t), of omega's shape."""
+        return np.sum(self.parts(omega)[1], axis=-1)
+
+    def velocity(self, omega: float, time: ArrayLike) -> Floats:
+        """v(t) under the force cos(omega t) from rest at t = 0, shape of `time`."""
+        apart, part = self.parts(omega)
+        t = np.asarray(time, dtype=np.float64)
+        return np.real(np.exp(1j * apart * t) * part.sum() - np.exp(np.multiply.outer(t, self.rate)) @ part)
+
+    def largest(self, omega: ArrayLike, duration: float) -> tuple[Floats, Floats]:
+        """The largest |v| up to a time under the force cos(omega t), and when it is reached.
+
+        Parameters
+        ----------
+        omega : array_like, shape (W,)
+            Angular frequencies, 1 / time.
+        duration : float
+            Time from the first push.
+
+        Returns
+        -------
+        velocity, time : ndarray, shape (W,)
+        """
+        omegas, part = self.parts(omega)
+        fastest = max(np.abs(self.rate.imag).max(), omegas.max())
+        count = int(np.ceil(duration * fastest / (2 * np.pi) * LOOKS_A_PERIOD)) + 1
+        step, largest, where = duration / (count - 1), *np.zeros((2, len(omegas)))
+        motion = np.exp(np.multiply.outer(step * np.arange(min(LOOKS_AT_ONCE, count)), self.rate))
+        for first in range(0, count, LOOKS_AT_ONCE):
+            t = step * np.arange(first, min(first + LOOKS_AT_ONCE, count))
+            transient = motion[: len(t)] @ (np.exp(step * first * self.rate) * part).T
+            v = np.abs(np.real(np.exp(1j * np.multiply.outer(t, omegas)) * part.sum(axis=1) - transient))
+            best = v.argmax(axis=0)
+            where, largest = np.where(v.max(axis=0) > largest, t[best], where), np.maximum(v.max(axis=0), largest)
+        for k, each in enumerate(omegas):  # between the times that were looked at
+            near = np.clip(np.linspace(where[k] - step, where[k] + step, 65), 0.0, duration)
+            v = np.abs(self.velocity(float(each), near))
+            where[k], largest[k] = near[v.argmax()], v.max()
+        return largest, where
+
+
+def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
+    """How the upper layer moves after an impulse.
+
+    Parameters
+    ----------
+    packing : Packing
+        The equilibrium, with its dashpots and drag.
+    force : array_like, shape (3N,)
+        f on (x.., y.., R theta..), as of `layer_force` or `floor_force`.
+    """
+    system = Motion.of(packing)
+    drive = _coordinates(packing, "force", force)[system.active] / system.root_mass
+    mean = np.concatenate([packing.top / max(1, packing.top.sum()), np.zeros(2 * len(packing))])
+    watch, still = mean[system.active] / system.root_mass, np.zeros_like(drive)
+    if system.dissipative:
+        rate, right = eig(system.first_order)
+        weight = (np.concatenate([still, watch]) @ right) * np.linalg.solve(right, np.concatenate([still, drive]))
+        return ImpulseResponse(rate + 0j, weight)
+    value, right = eig(system.stiffness.toarray())
+    weight = (watch @ right) * np.linalg.solve(right, drive)
+    frequency = np.sqrt(value.astype(np.complex128))
+    return ImpulseResponse(np.concatenate([1j * frequency, -1j * frequency]), np.tile(0.5 * weight, 2) + 0j)

@@ -20,6 +20,7 @@ Springs that draw blocks and granular layers as models of faults: J. M. Carlson,
 
 from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,8 +68,7 @@ class Slip:
         return self.force_before - self.force_after
 
 
-@dataclass(frozen=True)
-class _Row:
+class _Row(NamedTuple):
     time: float
     force: float
     displacement: float
@@ -110,14 +110,8 @@ class SlipDetector:
         begin, end = self._begin, self._end
         if begin is None or end is None:
             return None
-        return Slip(
-            begins=begin.time,
-            ends=end.time,
-            force_before=begin.force,
-            force_after=end.force,
-            slip=end.displacement - begin.displacement,
-            kinetic_energy=self._energy_at_end,
-        )
+        way = end.displacement - begin.displacement
+        return Slip(begin.time, end.time, begin.force, end.force, way, self._energy_at_end)
 
     @property
     def undecided(self) -> set[float]:
@@ -140,8 +134,10 @@ class SlipDetector:
             # a slip that overshoots goes on in its direction while the spring pushes back
             moved = np.sign((self._begin or before).force) * (displacement - before.displacement)
             fast = moved > self._threshold * (time - before.time)
-            if fast and self._begin is None:
-                self._begin, self._energy = self._largest(), 0.0
+            if fast and self._begin is None:  # where the force along its present direction was largest, the last time
+                direction = np.sign(self._past[-1].force)
+                self._begin = max(reversed(self._past), key=lambda old: float(direction * old.force))
+                self._energy = 0.0
             self._energy = max(self._energy, kinetic_energy)
             if fast:
                 self._end, self._energy_at_end = row, self._energy
@@ -152,11 +148,6 @@ class SlipDetector:
         while self._past[0].time < time - self.look_back:
             self._past.popleft()
         return found
-
-    def _largest(self) -> _Row:
-        """The largest force along its present direction, the last of several."""
-        direction = np.sign(self._past[-1].force)
-        return max(reversed(self._past), key=lambda row: float(direction * row.force))
 
 
 def find_slips(
@@ -218,9 +209,6 @@ def friction_of(time: Floats, force: Floats, slips: list[Slip], fy: float) -> Dr
 
     late = time >= (slips[0].begins if slips else time[0])
     mean = trapezoid(force[late], time[late]) / np.ptp(time[late]) if late.sum() > 1 else force[-1]
-    return DrivenFriction(
-        largest=float(np.abs(force).max() / fy),
-        mean=float(mean / fy),
-        before=float(np.mean([slip.force_before for slip in slips]) / fy) if slips else None,
-        after=float(np.mean([slip.force_after for slip in slips]) / fy) if slips else None,
-    )
+    ends = np.mean([(slip.force_before, slip.force_after) for slip in slips], axis=0) / fy if slips else (None, None)
+    before, after = (None if each is None else float(each) for each in ends)
+    return DrivenFriction(float(np.abs(force).max() / fy), float(mean / fy), before, after)

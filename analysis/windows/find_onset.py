@@ -13,9 +13,8 @@ from ..arrays import Floats, Matrix
 from ..counted import counted
 from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
-from ..motion.buckling import negative_eigenvalues, surely_positive
+from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
 from .motions import Motions, System, force_bearing
 from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
@@ -212,30 +211,25 @@ def find_onset(
     def at(fx: float) -> HasConfiguration:
         return start if fx == loads[0] else equilibrium(fx)
 
-    def negative_of(packing: HasConfiguration, system: System) -> Floats:
-        """The negative eigenvalues; a positive symmetric part shows that there are none."""
-        return np.zeros(0) if surely_positive(system.stiffness) else negative_eigenvalues(force_bearing(packing))
-
     def undamped(fx: float) -> System:
         """The branch of stable equilibria: it ends where one at a given load has a negative eigenvalue."""
         packing = at(fx)
-        system = System.of(packing)
-        if fx in loads[1:] and len(negative_of(packing, system)):
+        if fx in loads[1:] and len(negative_eigenvalues(force_bearing(packing))):
             ends.append(fx)
             raise TurningPointError(
                 f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch "
                 "of stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
-        return system
+        return System.of(packing)
 
     def undamped_onset() -> Onset:
         windows, doubtful = (), ()  # type: tuple[Window, ...], Increments
-        negative, at_start, opened = negative_of(start, System.of(start)), None, None
+        negative, at_start, opened = negative_eigenvalues(force_bearing(start)), None, None
         if len(negative):
             ends.append(start.fx)
             opened = float(negative[0]), 1.0
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        elif (first or not takes_all) and not isinstance(start, Packing):
+        elif (first or not takes_all) and start.law is None:
             at_start = _complex_at_start(start)
         if opened is None and at_start is None:
             try:

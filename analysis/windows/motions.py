@@ -119,11 +119,6 @@ class System:
         return unit_rounding(np.concatenate([a / self.frequency, g[0], np.full(len(self.active), self.frequency)]))
 
 
-def full_operator(packing: HasConfiguration) -> csr_array:
-    """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, of all coordinates, with its zero rows; 1 / time^2."""
-    return System.of(packing).stiffness
-
-
 @dataclass(frozen=True, eq=False)
 class Motions:
     """Motions at one load, by increasing real part of lambda, or imaginary part of s; one of each two conjugates.

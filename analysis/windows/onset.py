@@ -76,11 +76,6 @@ class Window:
         return None if self.end is None else self.end.fx
 
     @property
-    def rounding_error(self) -> float:
-        """Part of the onset's error that comes from rounding and from equilibria out of balance, force."""
-        return self.onset.error
-
-    @property
     def error(self) -> float:
         """Uncertainty of fx_onset: from rounding and, where known, from the path."""
         return self.onset.error + (self.path_error or 0.0)
@@ -107,11 +102,6 @@ class Window:
         value = self.onset.eigenvalue
         return value.imag if isinstance(value, complex) else float(np.sqrt(max(0.0, value)))
 
-    @property
-    def overlap(self) -> float:
-        """Smallest |y^H x| met at the onset."""
-        return self.onset.overlap
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON: fx_onset, fx_end, error, error_of_path, kind, and lambda, or frequency with dissipation."""
         known = {"fx_onset": self.fx_onset, "fx_end": self.fx_end, "error": self.error}
@@ -130,11 +120,13 @@ class OnsetError(FaultgougeError):
         How the user gets larger loads, as advice.
     finer : bool
         Whether smaller increments may show an onset, too.
+    undamped : Onset or None
+        Of a search with dissipation, the onset without it on the same loads.
     """
 
-    def __init__(self, finding: str, larger: str = "", finer: bool = False) -> None:
-        super().__init__(finding, larger, finer)
-        self.finding, self.larger, self.finer = finding, larger, finer
+    def __init__(self, finding: str, larger: str = "", finer: bool = False, undamped: "Onset | None" = None) -> None:
+        super().__init__(finding, larger, finer, undamped)
+        self.finding, self.larger, self.finer, self.undamped = finding, larger, finer, undamped
 
     def __str__(self) -> str:
         advice = ", or ".join(each for each in ("take smaller increments" * self.finer, self.larger) if each)
@@ -151,19 +143,7 @@ class OnsetError(FaultgougeError):
 
 
 class NoGrowthError(OnsetError):
-    """No motion grows on the given loads in spite of the dissipation.
-
-    Parameters
-    ----------
-    finding, larger, finer
-        As of :class:`OnsetError`.
-    undamped : Onset or None
-        The onset without dissipation on the same loads.
-    """
-
-    def __init__(self, finding: str, larger: str = "", finer: bool = False, undamped: "Onset | None" = None) -> None:
-        super().__init__(finding, larger, finer)
-        self.undamped = undamped
+    """No motion grows on the given loads in spite of the dissipation."""
 
 
 @dataclass(frozen=True)
@@ -218,11 +198,6 @@ class Onset(TableDisplay):
         """Uncertainty of fx_c."""
         return self.windows[0].error
 
-    @property
-    def window_count(self) -> str:
-        """The number of windows in words, as far as they were counted."""
-        return str(len(self.windows)) if self.complete else "not counted, as the search ended with the first"
-
     def describe(self) -> str:
         """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
         first, found = self.windows[0], self.at_start
@@ -238,11 +213,11 @@ class Onset(TableDisplay):
         shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
         return f"unstable at F_x = {self.fx_c:g}, {shear}: {known}"
 
-    def __str__(self) -> str:
-        return self.describe()
+    __str__ = describe
 
     def __repr__(self) -> str:
-        parts = [self.describe(), f"windows: {self.window_count}"]
+        counted_windows = len(self.windows) if self.complete else "not counted, as the search ended with the first"
+        parts = [self.describe(), f"windows: {counted_windows}"]
         if self.equilibria:
             reached = counted(len(self.equilibria), "equilibrium", "equilibria")
             parts = [f"mu = {self.mu:g}", *parts, f"{reached} up to F_x = {self.equilibria[-1].fx:g}"]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ...analysis.responses.power_law import fit_power_law
+from ...analysis.responses.growth import fit_power_law
 from ...pywrap import Engine, Equilibrium, Scene, equilibrate
 
 if sys.version_info >= (3, 11):

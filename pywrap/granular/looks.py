@@ -99,9 +99,8 @@ def may_act(fixes: dict[str, str]) -> str:
 def look(lmp: Any, given: Commands | None, files: dict[int, OpenFile], *, whole: bool = False) -> Looked:
     """Look at an instance that is a copy; `files` are the open files of the process.
 
-    If it is `whole`, whatever exerts forces is taken, and "at walls" has the sizes of the forces of
-    all walls on each particle, shape (N,). Without, contacts have laws that can be measured, or a NotLinearisedError
-    says why not.
+    If it is `whole`, whatever exerts forces is taken, and "at walls" has the sizes of the forces of all walls on each
+    particle, shape (N,). Otherwise contacts have laws that can be measured, or a NotLinearisedError says why not.
     """
     log = log_file(lmp, files)
     if given is None:
@@ -125,12 +124,9 @@ def look(lmp: Any, given: Commands | None, files: dict[int, OpenFile], *, whole:
     found = arrays_at_rest(lmp, groups, COLUMNS if whole else [usual + rolling])
     change = _change_in_time(lmp, plain, given.fixes)
     _walls(lmp, plain, acting_fixes(plain, given), found, together=whole)
-    forces = [
-        found["f"],
-        found["contacts"][:, 3:4],
-        *(each for name, each in found.items() if name.startswith("wall ")),
-    ]
-    if change > FOLLOWS_TIME * max(np.abs(each).max(initial=0.0) for each in forces):
+    walls = [each for name, each in found.items() if name.startswith("wall ")]
+    forces = np.concatenate([each.ravel() for each in (found["f"], found["contacts"][:, 3:4], *walls)])
+    if change > FOLLOWS_TIME * np.abs(forces).max():
         variable = (
             "a load, a wall or a region follows a variable of the step or the time; give it a constant before the last "
             "run, and run on until the packing rests"

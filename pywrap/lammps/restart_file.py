@@ -15,8 +15,9 @@ from mpi4py import MPI
 
 from ...analysis import PackingFileError
 from ...analysis.files import formats
+from ...analysis.files.atomic_write import begins_with
 from ...analysis.files.formats import Disks
-from ...analysis.files.formats.disks import ParticleTable, disks_of
+from ...analysis.files.formats.disks import in_plane, particles_of
 from .instance import lammps_instance
 from .plain_file_names import plain_name
 
@@ -33,7 +34,7 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
 
 def read_restart(path: Path) -> Disks:
     """Disks of a restart."""
-    if not formats.begins_with(path, formats.RESTART_BEGINNING):
+    if not begins_with(path, formats.RESTART_BEGINNING):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
     with closing(lammps_instance(MPI.COMM_SELF, None)) as lammps:
         try:
@@ -61,4 +62,5 @@ def read_restart(path: Path) -> Disks:
             lammps.command(f"variable member atom gmask({name})")
             groups[name] = np.array(lammps.extract_variable("member"))[:count][order] != 0
     box = np.diag(np.subtract(high, low))
-    return disks_of(ParticleTable(str(path), columns, box, np.array(low), [*map(bool, periodic)], groups=groups))
+    sides = [*map(bool, periodic)]
+    return in_plane(particles_of(path, columns, box, origin=np.array(low), periodic=sides, groups=groups))

@@ -197,13 +197,13 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     """
     settings = require_section(scene.drive, "drive")
     fastest, spring, omega = settings.fastest, settings.spring, settings.omega
-    signal = None if settings.signal == "pulse" else settings.forcing()
+    rigid, signal = spring == "rigid", None if settings.signal == "pulse" else settings.forcing()
     with Engine(start, communicator) as engine, engine.undamped(spring=spring, stages=settings.stages) as dynamics:
         dt = dynamics.time_step
     shortest = math.inf if signal is None else signal.shortest
     steps, period = settings.length(strength(start)) / dt, 2 * math.pi / omega if omega else math.inf
     own = float(stable_timestep(start))
-    limit = own if spring == "rigid" else float(stable_timestep(replace(start, spring=spring)))
+    limit = own if isinstance(spring, str) else float(stable_timestep(replace(start, spring=spring)))
     follows = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
     refusals = {
         f"the run would take {steps:.1g} time steps of {dt:.3g}, which no machine does: give a shorter drive.until, "
@@ -211,7 +211,7 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
         f"drive.omega = {omega} has a period of {period:.3g}, {follows}": period < 10 * dt,  # sampled to some per cent
         f"drive.signal has rows that are {shortest:.3g} apart, {follows}": shortest < dt,
         f"the layer moves at {fastest:g} by {fastest * dt:.3g} in a time step of {dt:.3g}, farther than the smallest "
-        f"radius {start.radius.min():g}: lower drive.velocity": spring == "rigid" and fastest * dt > start.radius.min(),
+        f"radius {start.radius.min():g}: lower drive.velocity": rigid and fastest * dt > start.radius.min(),
         f"the time step of the run is {dt:.3g}, and the limit {limit:.3g}, above which every run of this packing blows "
         f"up: lower {'damping.cn and damping.ct' if dt >= own else 'drive.spring'}": dt >= limit,
     }
@@ -384,9 +384,8 @@ def all_slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
     period = None if settings is None else layer_period(settings, file.packing(0))
     if settings is None or period is None or SERIES not in file.names_of_series:
         return [], None
-    series = file.series(SERIES)
-    time, force, moved, energy = (series[name] for name in ("time", "force", "displacement", "kinetic_energy"))
-    return find_slips(time, force, moved, energy, settings.fastest, period)
+    of = file.series(SERIES)
+    return find_slips(of["time"], of["force"], of["displacement"], of["kinetic_energy"], settings.fastest, period)
 
 
 def clock_advance(path: Path, other: Path) -> float | None:

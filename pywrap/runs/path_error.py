@@ -119,7 +119,7 @@ def with_path_error(
         growth = growth_near(window.frequency, with_dashpots)
         vanishes = growth if window.dissipative else squared_gap(window.eigenvalue)
         try:
-            correction, error = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
+            correction, error = path_error(path, window.fx_onset, vanishes, window.onset.error, known)
         except PATH_FAILURES:
             return window
         return replace(window, onset=replace(window.onset, fx=window.fx_onset + correction), path_error=error)

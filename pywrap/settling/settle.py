@@ -147,10 +147,10 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
             packing = clear_rattlers(packing, np.intersect1d(idle_disks(packing), touching))
     # from the units of the packing to those of the scene; where disks rest does not depend on their masses
     length, radius = 2 * min(section.radii), section.start(draw).radius
-    place: dict[str, Any] = {"position": length * packing.position, "radius": radius, "mass": section.mass_of(radius)}
     contacts = packing.contacts.slipped(length * packing.contacts.slip)
     box_length = None if packing.box_length is None else section.width
-    found = replace(packing, **place, contacts=contacts, box_length=box_length, law=law, fy=scene.load.fy)
+    place = replace(packing, position=length * packing.position, radius=radius, mass=section.mass_of(radius))
+    found = replace(place, contacts=contacts, box_length=box_length, law=law, fy=scene.load.fy)
     return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
 
 

@@ -44,7 +44,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import Floats, Indices, spectrum
-from faultgouge.analysis.windows import force_bearing, full_operator
+from faultgouge.analysis.windows import System, force_bearing
 from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
 from faultgouge.studies.packing_tools import path_from
 
@@ -98,7 +98,7 @@ def pencil_of(scene: Scene, rest: Equilibrium) -> InterpolatedOperator:
     step = float(ramp_loads(scene)[1])
     with path_from(rest, scene) as path:
         there = path(SMALL * step)
-    return InterpolatedOperator.between(full_operator(rest.packing), full_operator(there), there.fx)
+    return InterpolatedOperator.between(System.of(rest.packing).stiffness, System.of(there).stiffness, there.fx)
 
 
 def levels(scene: Scene, rest: Equilibrium) -> dict[str, Any]:

@@ -22,8 +22,7 @@ from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from ...analysis.files.atomic_write import check_own, make_folder, write_json, write_text
 from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
-from ...analysis.responses.growth import growing_range
-from ...analysis.responses.growth_of_run import PLATEAU_SHARE
+from ...analysis.responses.growth import PLATEAU_SHARE, growing_range
 from ...analysis.responses.response import Response, layer_force, linear_response
 from ...figures import PairCurve
 from ...figures.packing import draw_packing

@@ -165,7 +165,7 @@ def test_a_free_sphere_counts_nowhere():
     assert elastic_moduli(packing).density == pytest.approx(elastic_moduli(crystal()).density * 31 / 32)
 
 
-@pytest.mark.parametrize("frequency", [0.3, 3.0])
+@pytest.mark.parametrize("frequency", [1.0, 3.0])
 def test_moduli_over_frequency_are_those_of_a_motion(frequency):
     """A crystal with one heavy sphere is strained as sin(omega t), and followed until only that motion is left."""
     packing = disordered((2, 2, 2), restitution=0.05)

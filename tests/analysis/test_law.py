@@ -169,7 +169,6 @@ def test_curvature_and_inverse(exponent):
     force = law.normal_force(overlap)
     # 2/3 is rounded, and an error of the power counts |log(force/kn)| = 31 times
     np.testing.assert_allclose([law.overlap_of_force(f) for f in force], overlap, rtol=4e-15)
-    np.testing.assert_allclose([law.stiffness_scale(f) for f in force], force / overlap, rtol=4e-15)
     with mpmath.workdps(40):
         curvature = [
             mpmath.diff(lambda v: plain_force(law.kn, 0, 0, v, 0, mpmath.mpf(exponent))[0], d, 2) for d in overlap

@@ -6,9 +6,8 @@ import mpmath
 import numpy as np
 import pytest
 
+from faultgouge.analysis import fit_power_law, linear_response
 from faultgouge.analysis.responses.normal_form import ORTHOGONAL, NormalForm
-from faultgouge.analysis.responses.power_law import fit_power_law
-from faultgouge.analysis.responses.response import linear_response
 from faultgouge.analysis.windows.pair_over_load import normal_forms
 
 STAR = np.array([1.0, 1.0]) / np.sqrt(2)

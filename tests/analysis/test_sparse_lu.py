@@ -8,8 +8,8 @@ from scipy.sparse import csc_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import SuperLU, splu
 
 from faultgouge.analysis.factors import sparse_lu
-from faultgouge.analysis.factors.ldu import CompiledFactors
 from faultgouge.analysis.factors.sparse_lu import (
+    CompiledFactors,
     SingularMatrixError,
     elimination_places,
     general_lu,

@@ -5,6 +5,7 @@ import pytest
 from periodic_box import at_rest
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
+from table_rows import rows_of
 
 from faultgouge.analysis import (
     FaultgougeError,
@@ -155,33 +156,15 @@ SPHERES = "id,x,y,z,radius,mass\n1,0,0,0,0.5,1\n2,0.999,0,0,0.5,1\n3,5,0,0,0.5,1
 CONTACTS = "id1,id2,fn,ftx,fty,ftz\n1,2,1.0,0,0.1,0\n"
 
 
-@pytest.mark.parametrize(
-    ("spheres", "contacts", "material", "word"),
-    [
-        ("", CONTACTS, "young=1", "is no table"),
-        (SPHERES.replace("radius", "size"), CONTACTS, "young=1", "no column radius"),
-        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of particle 2 is -0.5"),
-        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "particle 1 twice"),
-        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: 'nan' is no number"),
-        (SPHERES.replace("0.999,0", "0.999"), CONTACTS, "young=1", "line 3: it has 5 columns"),
-        (SPHERES.replace("0.999", "near"), CONTACTS, "young=1", "'near' is no number"),
-        (SPHERES, CONTACTS.replace("id2", "other"), "young=1", "no column id2"),
-        (SPHERES, CONTACTS.replace("1,2,", "1,7,"), "young=1", "names sphere 7"),
-        (SPHERES, CONTACTS.replace("1,2,", "1,1,"), "young=1", "touches itself"),
-        (SPHERES, CONTACTS.replace("1,2,", "1,3,"), "young=1", "1 and 3 have a contact and are 4 apart"),
-        (SPHERES, CONTACTS.replace("fn,", "f,"), "young=1", "says no forces"),
-        (SPHERES, CONTACTS.replace("1,2,", "1,0,"), "young=1", "no px, py, pz"),
-        (SPHERES, CONTACTS.replace("0.1", "0.7"), "young=1", "0.7 f_n, beyond the coefficient of friction 0.5"),
-        (SPHERES, CONTACTS, "young=1", "out of balance by"),
-        (SPHERES, CONTACTS, "yung=1", "'yung=1': give young"),
-        (SPHERES, CONTACTS, "young=1,poisson=2", "poisson = 2"),
-    ],
-)
-def test_a_bad_table_is_refused_in_one_sentence(tmp_path, spheres, contacts, material, word):
-    (tmp_path / "s.csv").write_text(spheres)
-    (tmp_path / "c.csv").write_text(contacts)
-    with pytest.raises(FaultgougeError, match=word) as raised:
-        read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(material))
+@pytest.mark.parametrize(("table", "old", "new", "word"), rows_of("exchange/refused_contacts.txt"))
+def test_a_bad_table_is_refused_in_one_sentence(tmp_path, table, old, new, word):
+    texts = {"spheres": SPHERES, "contacts": CONTACTS, "material": "young=1"}
+    texts[table] = texts[table].replace(old.replace("\\n", "\n"), new.replace("\\n", "\n").strip("'"))
+    (tmp_path / "s.csv").write_text(texts["spheres"])
+    (tmp_path / "c.csv").write_text(texts["contacts"])
+    with pytest.raises(FaultgougeError) as raised:
+        read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(texts["material"]))
+    assert word in str(raised.value)
     assert "\n" not in str(raised.value)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference_layer import BIN
+from table_rows import rows_of
 
 from faultgouge import load
 from faultgouge.analysis import (
@@ -79,11 +80,10 @@ def mercury(packing, dimensions=2, times=(0.0, 0.5)):
     return text
 
 
-@pytest.mark.parametrize("columns", ["x_y_z_r", "x_y_z_r_matId", "id_x_y_z_r_matId", "x_y_z_r_attrs"])
+@pytest.mark.parametrize("columns", ["x_y_z_r", "id_x_y_z_r_matId", "x_y_z_r_attrs"])
 def test_yade_text(tmp_path, sheared, columns):
     disks = read_to_the_bit(tmp_path / "packing.txt", yade(sheared, columns), sheared)
-    assert disks.box_length is None
-    assert disks.remark == ""
+    assert (disks.box_length, disks.remark) == (None, "")
     if "matId" in columns:
         np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)
     (tmp_path / "short.txt").write_text(yade(sheared, columns, "%g"))
@@ -92,8 +92,7 @@ def test_yade_text(tmp_path, sheared, columns):
     np.testing.assert_allclose(disks.position, sheared.position, rtol=5e-6)  # half of the sixth digit
 
 
-@pytest.mark.parametrize("dimensions", [2, 3])
-@pytest.mark.parametrize("name", ["run.data", "run.data.0012"])
+@pytest.mark.parametrize(("dimensions", "name"), [(2, "run.data"), (3, "run.data.0012")])
 def test_mercury_data(tmp_path, sheared, dimensions, name):
     disks = read_to_the_bit(tmp_path / name, mercury(sheared, dimensions), sheared)
     assert disks.box_length == sheared.box_length
@@ -103,11 +102,7 @@ def test_mercury_data(tmp_path, sheared, dimensions, name):
 
 def test_what_is_compressed_is_what_it_was(tmp_path, sheared):
     """LAMMPS itself writes a dump whose name ends in .gz, and text of any other code may be compressed, too."""
-    for name, text in (
-        ("a.dump.gz", dump(sheared)),
-        ("a.csv.gz", csv(sheared, "x,y,radius")),
-        ("dump.500.gz", dump(sheared)),
-    ):
+    for name, text in (("dump.500.gz", dump(sheared)), ("a.csv.gz", csv(sheared, "x,y,radius"))):
         (tmp_path / name).write_bytes(gzip.compress(text.encode()))
         np.testing.assert_array_equal(read_disks(tmp_path / name).position, sheared.position)
     (tmp_path / "cut.dump.gz").write_bytes(gzip.compress(dump(sheared).encode())[:-100])
@@ -115,8 +110,7 @@ def test_what_is_compressed_is_what_it_was(tmp_path, sheared):
         read_disks(tmp_path / "cut.dump.gz")
 
 
-@pytest.mark.parametrize("mass", [2.5, [2.0, 3.0, 4.0]])
-@pytest.mark.parametrize("top", [[2], [False, False, True]])
+@pytest.mark.parametrize(("mass", "top"), [(2.5, [2]), ([2.0, 3.0, 4.0], [False, False, True])])
 def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, mass, top):
     disks = {"x": [0.5, 1.6, 2.7], "y": [0.5, 0.5, 0.5], "radius": [0.5] * 3, "top": top, "mass": mass}
     (tmp_path / "packing.json").write_text(json.dumps(disks))
@@ -128,25 +122,19 @@ def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, m
 def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):
     (tmp_path / "a.dump").write_text(dump(sheared))
     (tmp_path / "ids").write_text("1 2\n5-7\n")
-    disks = read_disks(tmp_path / "a.dump")
-    y = sheared.position[:, 1]
+    disks, (x, y) = read_disks(tmp_path / "a.dump"), sheared.position.T
     held = np.isin(np.arange(len(y)), [*sheared.contacts.i, *sheared.contacts.j])
     tenth = np.sort(y[held])[-10]
     assert not held[y >= tenth].all()  # a disk among them touches nothing
     some = np.isin(np.arange(len(y)), [0, 1, 4, 5, 6])
-    for says, expected in (
-        ("10", held & (y >= tenth)),
-        (10, held & (y >= tenth)),
-        ("type:2", sheared.top),
-        ("ids:1,2,5-7", some),
-        (f"ids:@{tmp_path / 'ids'}", some),
-        ("y>8 and x<=5", (y > 8) & (sheared.position[:, 0] <= 5)),
-    ):
+    ways = {"10": held & (y >= tenth), "type:2": sheared.top, "y>8 and x<=5": (y > 8) & (x <= 5)}
+    ways |= dict.fromkeys(("ids:1,2,5-7", f"ids:@{tmp_path / 'ids'}"), some)
+    for says, expected in ways.items():
         np.testing.assert_array_equal(upper_layer(disks, says), expected)
-    for says in ("type:7", "y>1000", "0"):
+    for says in ("y>1000", "0"):
         with pytest.raises(BadInputError, match="holds no disk"):
             upper_layer(disks, says)
-    for says in ("ids:1-1000", "ids:a", "group:upper", "y>>3", "z>3", "101", "y>e", "ids:@nowhere"):
+    for says in ("type:7", "ids:1-1000", "ids:a", "group:upper", "y>>3", "z>3", "101", "y>e", "ids:@nowhere"):
         with pytest.raises(BadInputError, match="--top"):
             upper_layer(disks, says)
 
@@ -162,26 +150,13 @@ def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_p
     with pytest.raises(PackingFileError, match="LAMMPS itself reads it"):
         read_disks(tmp_path / "packing.restart")
     disks = restart_file.read_disks(tmp_path / "packing.restart")
-    np.testing.assert_array_equal(upper_layer(disks, "group:upper"), sheared.top)
-    np.testing.assert_array_equal(upper_layer(disks, "group:odd"), np.arange(len(sheared)) % 2 == 0)
-    np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)
+    for says, layer in (("group:upper", sheared.top), ("type:2", sheared.top), ("group:odd", disks.id % 2 == 1)):
+        np.testing.assert_array_equal(upper_layer(disks, says), layer)
     moved = nearest_image(disks.position - sheared.position, sheared.box_length)  # LAMMPS takes images into the box
-    np.testing.assert_allclose(moved[:, 0], 0, atol=1e-14)
-    np.testing.assert_array_equal(disks.position[:, 1], sheared.position[:, 1])
+    np.testing.assert_allclose(moved, 0, atol=1e-14)
     np.testing.assert_array_equal(disks.radius, sheared.radius)
     np.testing.assert_allclose(disks.mass, sheared.mass, rtol=2.3e-16)  # a last bit: density times volume is rounded
     assert disks.box_length == sheared.box_length
-
-
-def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
-    rows = zip(sheared.position.tolist(), sheared.radius.tolist(), strict=True)
-    line = "ATOM {n:6d}  C   DSK A{n:4d}    {x:9.4f} {y:9.4f}   0.000  0.0000 {r:.4f}"
-    text = "\n".join(line.format(n=n, x=x, y=y, r=r) for n, ((x, y), r) in enumerate(rows, 1))
-    (tmp_path / "packing.pqr").write_text(text + "\n")
-    disks = read_disks(tmp_path / "packing.pqr")
-    np.testing.assert_allclose(disks.position, sheared.position, atol=1e-4)
-    np.testing.assert_allclose(disks.radius, sheared.radius, rtol=1e-6)
-    assert "float32" in disks.remark
 
 
 @pytest.mark.ranks
@@ -191,27 +166,21 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, faultgouge_here
     """Without friction, or with slips, and then with friction; on any number of ranks."""
     packing, digits = (sheared, 6) if slips else (reference_packing(1.0), 3)
     # with 3 digits, a hundredth of an overlap, forces of the order of the load; with 6, forces of 1e-2
-    rounded = replace(packing, position=np.round(packing.position, digits))
+    rounded, c = replace(packing, position=np.round(packing.position, digits)), packing.contacts
     (tmp_path / "rough.csv").write_text(csv(rounded, "x,y,radius,top"))
-    words, c = ["import", "rough.csv", "--width", packing.box_length, *LAW, "--fx", packing.fx], packing.contacts
-    if slips:
-        table_of_slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
-        np.savetxt(tmp_path / "slips.csv", table_of_slips, "%.17g", ",", header="id1,id2,slip", comments="")
-        words += ["--contacts", "slips.csv"]
+    table_of_slips = np.column_stack([c.i + 1, c.j + 1, c.slip])
+    np.savetxt(tmp_path / "slips.csv", table_of_slips, "%.17g", ",", header="id1,id2,slip", comments="")
+    words = ["import", "rough.csv", "--width", packing.box_length, *LAW, "--fx", packing.fx]
+    words += ["--contacts", "slips.csv"] * slips
     refused = faultgouge_here(*words, "-o", "one.h5", code=2)
     assert re.search("not in balance under .*fy = 3.*--relax", refused.stderr)
     assert not (tmp_path / "one.h5").exists()
-    found = []
     for name, run in (("one.h5", faultgouge_here), ("two.h5", partial(faultgouge, ranks=2))):
         assert "brought to rest" in run(*words, "--relax", "-o", name).stdout
-        with RunFile(tmp_path / name) as file:
-            found.append(file.packing())
-    rest = found[0]
-    assert rest == found[1]
-    assert rest.fx == packing.fx
-    assert rest.residual < 1e-9
-    if slips:
-        # friction keeps the slips to within what the disks have moved
+    rest = load(tmp_path / "one.h5")
+    assert rest == load(tmp_path / "two.h5")
+    assert (rest.fx, rest.residual < 1e-9) == (packing.fx, True)
+    if slips:  # friction keeps the slips to within what the disks have moved
         np.testing.assert_allclose(rest.contacts.slip, c.slip, atol=1e-6)
         return
     assert not rest.contacts.slip.any()
@@ -236,70 +205,21 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
         settled(file="packing.dump")
 
 
-DISK = '{"x": [0], "y": [1], "radius": [1]'
-BAD = {
-    "a.dump": [
-        (lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
-        (lambda p: dump(p) + dump(p, 7, count=50), "frames with 50 and 100 particles: choose one with --frame"),
-        (lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions (z goes from 0 to 9)"),
-        (lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
-        (lambda p: re.sub(r"(?m)^(0 11.9|-1 60|-0.5 0.5)$", r"\1 1", dump(p)), "tilted box"),
-    ],
-    "a.csv": [
-        ("x,y,radius\n1,1,0.5\n3,1,0.5\n1.1,1,0.5\n", "disks 1 and 3 are 0.1 apart"),
-        ("x,y,radius\n1,-1,0.5\n3,1,0.5\n", "say with --floor"),
-        ("x,y,radius\n1,one,0.5\n", "line 2: 'one' is no number"),
-        ("x,y,radius\n1,nan,0.5\n", "line 2: 'nan' is no number"),
-        ("x,y,radius\n1,1,0.5\n1,1\n", "line 3: it has 2 columns"),
-        ("x,y,radius\n1,1,0\n", "radius of particle 1 is 0"),
-        ("id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has particle 1 twice"),
-        ("", "is no table"),
-        ("x y radius\n", "is no table"),
-        ("x;y;radius\n1.234,5;1;1\n", "is no number"),
-        ("x,y,radius\n1,25,0,5,0,5\n", "it has 6 columns"),
-        ("x [mm],y,radius [um]\n1,1,1\n", "x is in mm, and y has no unit: give every length one, or none"),
-        ("x [mm],y [mm],radius [kg]\n1,1,1\n", "unit of radius, 'kg', does not convert to mm"),
-    ],
-    "a.json": [
-        ("", "is not read as packing.json"),
-        ("[1, 2]", "is not read as packing.json"),
-        ('{"x": [0], "y": [1]}', "it lacks 'radius'"),
-        ('{"x": [0], "y": [1, 2], "radius": [1]}', "is not read as packing.json"),
-        ('{"x": ["a"], "y": [1], "radius": [1]}', "could not convert string to float: 'a'"),
-        (f'{DISK}, "top": [1]}}', "top must hold indices of disks"),
-        (f'{DISK}, "top": [0.5]}}', "top must hold indices of disks"),
-        (f'{DISK}, "mass": [1, 2]}}', "is not read as packing.json"),
-        (f'{DISK}, "mass": -1}}', "mass of particle 1 is -1"),
-        (f'{DISK}, "box_length": 1}}', "two largest"),
-        ('{"x": [0], "y": [1], "radius": [1e-300]}', "give one between 1e-100 and 1e+100"),
-        ('{"x": [0, 0], "y": [1, 1], "radius": [1, 1]}', "are 0 apart"),
-    ],
-    "a.data": [
-        ("LAMMPS\n\n3 atoms\n", "no section Atoms"),
-        ("LAMMPS\n\n1 atoms\n\nAtoms # atomic\n\n1 1 1 1 0\n", "atom style atomic"),
-        ("LAMMPS\n\n1 atoms\n\nAtoms\n\n1 1 1 1 1 1 0\n", "it lacks 'xlo xhi'"),
-        ("2 0.5 0 0 9 9\n1 1 0 0 0.5 0 0 0\n", "breaks off"),
-        (lambda p: mercury(p, 3, (0.0,)).replace(" 0 0 0 ", " 1 0 0 ", 1), "three dim"),
-    ],
-    "a.txt": [
-        ("#format x_y_z\n1 1 0\n", "names no columns x, y, z and r"),
-        ("#format x_y_z_r\n1 1 0\n", "line 2: it has 3 columns, and line 1 announces 4"),
-    ],
-    "a.xyz": [
-        ("1\nhello\nH 1 1 0\n", "no Properties"),
-        ("one\nhello\n", "is not read as extended XYZ"),
-        ("3\nProperties=pos:R:3\n1 1 0\n", "breaks off"),
-    ],
-    "a.gsd": [("?", "is not read as GSD")],
-    "a.restart": [("?", "no LAMMPS restart file")],
-    "a.doc": [("?", "is of no format that is read: give dumps of the decks (.disks)")],
-}
-"""Files, and what is said of them."""
+BAD = [
+    ("a.dump", lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
+    ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "frames with 50 and 100 particles: choose one with --frame"),
+    ("a.dump", lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions (z goes from 0 to 9)"),
+    ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
+    ("a.dump", lambda p: re.sub(r"(?m)^(0 11.9|-1 60|-0.5 0.5)$", r"\1 1", dump(p)), "tilted box"),
+    ("a.data", lambda p: mercury(p, 3, (0.0,)).replace(" 0 0 0 ", " 1 0 0 ", 1), "three dim"),
+]
+"""Files, and what is said of them; more in refused_files.txt."""
 
 
-@pytest.mark.parametrize(("name", "text", "says"), [(name, *case) for name, cases in BAD.items() for case in cases])
+@pytest.mark.parametrize(("name", "text", "says"), [*BAD, *rows_of("exchange/refused_files.txt")])
 def test_bad_input_is_refused_in_one_sentence(tmp_path, sheared, name, text, says):
-    (tmp_path / name).write_text(text if isinstance(text, str) else text(sheared))
+    text = text(sheared) if callable(text) else text if isinstance(text, str) else json.dumps(text)
+    (tmp_path / name).write_text(text.strip("'").replace("\\n", "\n"))
     with pytest.raises(BadInputError) as refused:
         load(tmp_path / name, law=MindlinLaw(2e5, 5e4, 1.0), fy=3.0, top=1)
     assert says in str(refused.value)
@@ -312,20 +232,8 @@ def test_options_that_do_not_fit(tmp_path, refusal, sheared):
     (tmp_path / "scene.toml").write_text("[law]\nkn = 2e5\n[load]\nfy = 3.0\n")
     (tmp_path / "apart.csv").write_text("x,y,radius\n1,3,0.5\n3,3,0.5\n")
     (tmp_path / "run.h5").write_bytes(SEAL)
-    layer = f"--top type:2 {' '.join(LAW)}"
-    for words, says in (
-        (f"a.dump {' '.join(LAW)}", "does not say which disks are the upper layer: add --top"),
-        ("a.dump", "add --top --kn --fy, as in `faultgouge import ... --top 10 --kn 2e5 --fy 3`"),
-        ("a.dump --top type:2 --kn -1 --fy 3", "law.kn = -1.0 is refused"),
-        ("a.dump --scene scene.toml --fx 0 --kn 1", "--kn cannot stand beside --scene"),
-        (f"a.dump {layer} --width wide", "--width wide"),
-        (f"a.dump {layer} --frame 2", "no --frame 2"),
-        (f"b.dump {layer}", "does not exist"),
-        (f"a.dump {layer} -o a.dump", "exists"),
-        (f"apart.csv --top 1 {' '.join(LAW)}", "no disk touches another"),
-        (f"run.h5 --top 1 {' '.join(LAW)}", "needs no import"),
-    ):
-        assert says in refusal("import", *words.split())
+    for words, says in rows_of("exchange/refused_options.txt"):
+        assert says in refusal("import", *words.replace("LAYER", "--top type:2 --kn 2e5 --fy 3").split())
 
 
 HOWTO = Path(__file__).parents[2] / "docs" / "howto_own_packing.md"
@@ -356,19 +264,12 @@ def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
     assert (tmp_path / "mode.gif").read_bytes().startswith(b"GIF89a")
 
 
-@pytest.fixture
-def heap(tmp_path):
-    """The table of a disk that rests on another, which stands on the floor; without tangential forces."""
-    overlap = np.array([(6.0 / 2e5), (3.0 / 2e5)]) ** (2 / 3)
-    y = np.cumsum([0.5, 1.0]) - np.cumsum(overlap)
-    path = tmp_path / "heap.csv"
-    path.write_text(f"x,y,radius,top\n1.0,{y[0]:.17g},0.5,1\n1.0,{y[1]:.17g},0.5,1\n")
-    return path
-
-
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".xyz", ".data", ".gsd"])
-def test_that_slips_are_not_known_goes_wherever_the_packing_goes(heap, tmp_path, suffix):
-    given = {"law": MindlinLaw(2e5, 5e4, 1.0), "fy": 3.0}
+def test_that_slips_are_not_known_goes_wherever_the_packing_goes(tmp_path, suffix):
+    """From the table of a disk that rests on another, which stands on the floor; without tangential forces."""
+    low, high = np.cumsum([0.5, 1.0]) - np.cumsum([(each / 2e5) ** (2 / 3) for each in (6.0, 3.0)])
+    heap, given = tmp_path / "heap.csv", {"law": MindlinLaw(2e5, 5e4, 1.0), "fy": 3.0}
+    heap.write_text(f"x,y,radius,top\n1.0,{low:.17g},0.5,1\n1.0,{high:.17g},0.5,1\n")
     packing, file = load(heap, **given), heap if suffix == ".csv" else tmp_path / f"stored{suffix}"
     if suffix == ".h5":
         with RunFile.create(file, packing) as run:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
 from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
-from faultgouge.analysis.files.formats.disks import layer_remark
 from faultgouge.analysis.files.formats.tables import read_slips
 
 LAW = MindlinLaw(2e5, 5e4, 0.5)
@@ -22,35 +22,14 @@ def read(tmp_path):
     return write_and_read
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "x;y;radius\n1,25;0,5;0,5\n2,24;5,0e-1;,5\n",
-        "x\ty\tradius\n1,25\t0,5\t0,5\n2,24\t0,5\t0,5\n",
-        "x y radius\n1,25 0,5 0,5\n2,24 0,5 0,5\n",
-        "# tracked on 3 May, camera 2\n// frame 7\nx;y;radius\n1.25;0.5;0.5\n# the second disk\n2.24;0.5;0.5\n",
-        "// tracked\n# x y radius\n1.25 0.5 0.5\n2.24 0.5 0.5\n",
-        "\ufeffx;y;radius\n1,25;0,5;0,5\n2,24;0,5;0,5\n",
-        "x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n",
-        "id,pos_x,pos_y,rad\n1,1.25,0.5,0.5\n2,2.24,0.5,0.5\n",
-    ],
-    ids=["semicolons", "tabs", "blanks", "comments", "head in a comment", "byte order mark", "plain", "other names"],
-)
+@pytest.mark.parametrize(("text", "remark"), rows_of("exchange/tables_of_laboratories.txt"))
 @pytest.mark.parametrize("name", ["lab.csv", "lab.txt"])
-def test_tables_as_others_write_them(read, text, name):
+def test_tables_as_others_write_them(read, text, remark, name):
+    for escape, letter in (("\\n", "\n"), ("\\t", "\t"), ("\\ufeff", "\ufeff")):
+        text = text.replace(escape, letter)
     disks = read(text, name)
     assert disks.position.tolist() == [[1.25, 0.5], [2.24, 0.5]]
-    assert disks.radius.tolist() == [0.5, 0.5]
-    assert disks.remark == ""
-
-
-@pytest.mark.parametrize("head", ["x [mm];y [mm];radius [µm]", "x (mm) y (mm) radius (μm)", "x[mm],y[mm],radius[um]"])
-def test_lengths_are_converted_to_the_unit_of_x(read, head):
-    mark = ";" if ";" in head else "," if "," in head else " "
-    disks = read(f"{head}\n{mark.join(('1.25', '0.5', '512.5'))}\n{mark.join(('2.24', '0.5', '500'))}\n")
-    assert disks.radius.tolist() == [0.5125, 0.5]
-    assert disks.position.tolist() == [[1.25, 0.5], [2.24, 0.5]]
-    assert disks.remark == "lengths are in mm: give law and load in these units"
+    assert (disks.radius.tolist(), disks.remark) == ([0.5, 0.5], remark.strip("'"))
 
 
 def test_angles_masses_and_densities_are_converted_too(read):
@@ -78,23 +57,9 @@ def test_slips_are_in_the_unit_of_the_disks(read, tmp_path):
     assert found[0, 3] == -0.25e-3
 
 
-BAD_SLIPS = [
-    (
-        "id1;id2;slip [µm]\n1;2;0,5\n2;3;1\n",
-        "1 slip is of disks that do not touch: 2 and 3 are 0.201 apart: leave such",
-    ),
-    ("id1;id2;slip [µm]\n2;3;1\n4;0;2\n", "2 slips are of disks that do not touch: 2 and 3 are 0.201 apart"),
-    ("id1;id2;slip [µm]\n4;0;2\n", "4 and the floor are 0.865 apart"),
-    ("id1;id2;slip\n1;2;0,5\n", "the disks are in mm, and slip has no unit"),
-    ("id1;id2;slip [kg]\n1;2;0,5\n", "the unit of slip, 'kg', does not convert to mm"),
-    ("id1;id2;other [mm]\n1;2;0,5\n", "has no column slip"),
-    ("id1;id2;slip [mm]\n1;9;0,5\n", "a contact names disk 9, which is not there"),
-]
-
-
-@pytest.mark.parametrize(("table", "says"), BAD_SLIPS)
+@pytest.mark.parametrize(("table", "says"), rows_of("exchange/refused_slips.txt"))
 def test_slips_that_fit_no_contact_are_refused(read, tmp_path, table, says):
-    head, rows = table.split("\n", 1)
+    head, rows = table.replace("\\n", "\n").split("\n", 1)
     with pytest.raises(PackingFileError, match=says):
         packing_of(disks := with_slips(read, tmp_path, rows, head), LAW, upper_layer(disks, 1), fy=1.0)
 
@@ -130,16 +95,7 @@ def test_types_of_gsd_have_names(tmp_path):
 
 
 def test_the_highest_disks_are_those_that_touch_something(read):
-    disks = read(XYZ, "a.xyz")
-    layer = upper_layer(disks, 2)
-    assert layer.tolist() == [True, False, True, False]
-    says = "--top 2 leaves out 1 of the highest disks, which touch nothing: 4"
-    assert layer_remark(disks, "2", layer) == says
-    both = upper_layer(disks, "y>1")
-    assert layer_remark(disks, "y>1", both) == "1 of the 2 disks of the upper layer touch nothing: 4"
-    every = upper_layer(disks, 4)
-    assert every.all()
-    assert "1 of the 4 disks" in layer_remark(disks, "4", every)
+    assert upper_layer(read(XYZ, "a.xyz"), 2).tolist() == [True, False, True, False]
 
 
 def test_a_table_of_a_laboratory_as_a_command(faultgouge_here, tmp_path):
@@ -148,4 +104,3 @@ def test_a_table_of_a_laboratory_as_a_command(faultgouge_here, tmp_path):
     options = ("--top", "1", "--kn", "2e5", "--fy", "3", "--relax", "--width", "2")
     done = faultgouge_here("import", "lab.csv", *options, "-o", "lab.h5", code=None)
     assert "lab.csv: lengths are in mm: give law and load in these units" in done.stderr
-    assert "--top 1 leaves out 1 of the highest disks, which touch nothing: 4" in done.stderr

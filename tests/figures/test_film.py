@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from faultgouge.analysis import Packing
-from faultgouge.figures.film import (
-    COLOUR_DIFFERENCE,
-    LARGEST_SHOWN,
-    RunMotion,
-    faces_by_way,
-    film_of_ramp,
-    film_of_run,
-    usual_suffix,
-    write_film,
-)
+from faultgouge.analysis import Packing, PackingFileError, RunFile
+from faultgouge.figures.film import COLOUR_DIFFERENCE, usual_suffix, write_film
+from faultgouge.figures.motion_films import LARGEST_SHOWN, RunMotion, faces_by_way, film_of_ramp, film_of_run
 
 
 @pytest.fixture(scope="module")
@@ -45,51 +37,41 @@ def test_magnification_is_a_power_of_ten_that_only_falls(motion):
     assert np.all(shown[1:] > 0.1 * most * (1 - 1e-12))
 
 
-def test_displacements_are_those_of_the_nearest_image(packing):
+def test_displacements_of_a_file_are_those_of_the_nearest_image_and_a_part_of_the_run_is_its_times(packing, tmp_path):
     position = np.stack([packing.position, packing.position + np.array([packing.box_length + 1e-3, 0.0])])
-    moved = RunMotion.of(packing, np.array([0.5, 1.0]), position).displacement
-    np.testing.assert_allclose(moved[2], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
-
-
-def test_a_part_of_a_run(motion):
-    part = motion.between(2.0, 3.0)
-    assert part.time[0] >= 2.0
-    assert part.time[-1] <= 3.0
+    with RunFile.create(tmp_path / "run.h5", packing) as run:
+        run.append(packing)
+        run.append_trajectory([0.5, 1.0], position)
+        motion = RunMotion.read(run)
+    np.testing.assert_allclose(motion.displacement[2], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
+    assert motion.between(0.4, 1.5).time.tolist() == [0.5, 1.0]
+    with pytest.raises(PackingFileError, match=r"1 samples from t = 0\.4 to 0\.6, and two are needed"):
+        motion.between(0.4, 0.6)
 
 
 @pytest.mark.slow
-def test_a_film_that_ends_early_leaves_the_one_before(tmp_path, motion):
+def test_a_gif_holds_every_frame_stays_close_to_it_and_outlives_a_film_that_ends_early(tmp_path, motion):
     """A film is made of a file that is there, and in a minute: half of one is worth less than the one before."""
+    film, path = film_of_run(motion, 8, dots=80), tmp_path / "film.gif"
+    write_film(film, path, 20)
+    for number, seen in ((0, path), (4, path), (7, path)):
+        with Image.open(seen) as gif:
+            assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (8, film.size, 0, 50)
+            gif.seek(number)
+            off = np.abs(np.asarray(gif.convert("RGB")).astype(int) - film.frame(number)).max(axis=2)
+            # the palette has 64 colours, and rare ones are farther from theirs than what stays unseen
+            assert np.mean(off > COLOUR_DIFFERENCE) < 0.01
+    # so that 100 frames take less than 1.5 MB even here, where each disk moves anew in each frame
+    assert path.stat().st_size < 8 * 12_000
+    before = path.read_bytes()
 
     def failing(numbers, count):
         yield from numbers[:3]
         raise MemoryError
 
-    film = film_of_run(motion, 7, dots=60)
     with pytest.raises(MemoryError):
-        write_film(film, tmp_path / "run.gif", 10, failing)
-    assert list(tmp_path.iterdir()) == []
-    write_film(film, tmp_path / "run.gif", 10)
-    with pytest.raises(MemoryError):
-        write_film(film, tmp_path / "run.gif", 10, failing)
-    (left,) = tmp_path.iterdir()
-    with Image.open(left) as gif:
-        assert gif.n_frames == 7
-
-
-@pytest.mark.slow
-def test_a_gif_holds_every_frame_and_stays_close_to_it(tmp_path, motion):
-    film = film_of_run(motion, 12)
-    write_film(film, tmp_path / "film.gif", 20)
-    with Image.open(tmp_path / "film.gif") as gif:
-        assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (12, film.size, 0, 50)
-        for number in (0, 6, 11):
-            gif.seek(number)
-            off = np.abs(np.asarray(gif.convert("RGB")).astype(int) - film.frame(number)).max(axis=2)
-            # the palette has 63 colours, and rare ones are farther from theirs than what stays unseen
-            assert np.mean(off > COLOUR_DIFFERENCE) < 0.01
-    # so that 100 frames, the default, take less than 1.5 MB even here, where each disk moves anew in each frame
-    assert (tmp_path / "film.gif").stat().st_size < 12 * 15_000
+        write_film(film, path, 10, failing)
+    assert [each.read_bytes() for each in tmp_path.iterdir()] == [before]
 
 
 def test_a_run_and_a_ramp_show_what_moves(motion, packing):

@@ -21,7 +21,6 @@ from faultgouge.analysis import (
     touching,
 )
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.motion.modes import participation_ratio, rotation_share
 from faultgouge.figures import PairCurve, draw_packing, draw_pair, save
 from faultgouge.figures.disk_view import View
 from faultgouge.figures.mode import ModeShape, draw_modes
@@ -126,18 +125,17 @@ def test_arrows_show_the_load_on_the_upper_layer(packing):
 
 @pytest.mark.parametrize("fx", [0.01, -0.01])
 def test_no_arrow_of_the_weight_runs_through_the_shear_force_and_its_name(packing, fx):
-    """The highest disk of the layer is moved to each place where the arrow or its name might stand."""
-    top = np.flatnonzero(packing.top)
-    for place in np.linspace(0.3, 0.7, 9) * packing.box_length:
+    """Whatever the place of the highest disk of the layer."""
+    for place in (0.3, 0.5, 0.7):
         position = packing.position.copy()
-        position[top, 0] = place + np.linspace(0, 1.5, len(top))
-        position[top, 1] = position[:, 1].max() + 1
+        position[np.flatnonzero(packing.top)[-1]] = place * packing.box_length, position[:, 1].max() + 1
         figure = draw_packing(replace(packing, position=position, fx=fx))
         down, along = figure.findobj(Quiver)
-        (name,) = [text for text in figure.axes[0].texts if text.get_text() == "$F_x$"]
-        ends = [name.get_position()[0] - np.sign(fx) * 0.7, along.X[0] + along.U[0]]
-        crossing = (min(ends) < down.X) & (max(ends) > down.X) & (along.Y[0] < down.Y)
-        assert not crossing.any()
+        texts = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
+        assert along.Y[0] == texts["$F_x$"][1] > down.Y.max()
+        assert np.sign(along.U[0]) == np.sign(along.X[0] - texts["$F_x$"][0]) == np.sign(fx)
+        name, reach = texts["$F_y$"], sorted([along.X[0] - np.sign(fx) * 0.8, along.X[0] + along.U[0]])
+        assert not reach[0] < name[0] < reach[1]
 
 
 @pytest.mark.slow
@@ -162,24 +160,12 @@ def pyramid() -> Packing:
     return replace(bare, contacts=Contacts(contacts.i, contacts.j, slip))
 
 
-def test_participation_and_rotation_of_plain_motions():
-    alone, together, turning = np.zeros((3, 3, 4))
-    alone[0, 2], together[1], turning[2] = 1.0, 0.5, 0.5
-    columns = np.column_stack([each.ravel() for each in (alone, together, turning)])
-    np.testing.assert_allclose(participation_ratio(columns), [0.25, 1, 1], rtol=1e-15)
-    np.testing.assert_allclose(rotation_share(columns), [0, 0, 1], rtol=1e-15)
-
-
 def test_normal_modes_are_those_of_the_spectrum_and_the_closest_have_the_largest_cosine(pyramid):
     modes = normal_modes(pyramid)
     np.testing.assert_array_equal(modes.values.real, spectrum(pyramid).eigenvalues.real)
-    assert np.all((modes.participation >= 1 / 3) & (modes.participation <= 1 + 1e-12))
     first, second, cosine = closest_to_meeting(modes)
-    right = modes.right.real
-    others = [abs(right[:, a] @ right[:, b]) for a in range(len(right.T)) for b in range(a)]
-    assert cosine == pytest.approx(max(others), rel=1e-12)
-    assert abs(right[:, first] @ right[:, second]) == pytest.approx(cosine, rel=1e-12)
-    assert modes.values[first].real < modes.values[second].real
+    cosines = np.abs(np.triu(modes.right.real.T @ modes.right.real, 1))
+    assert cosine == pytest.approx(cosines.max(), rel=1e-12) == cosines[first, second]
 
 
 @pytest.mark.parametrize("along_y", [1.0, 4e-4])
@@ -201,7 +187,7 @@ def test_a_complex_mode_is_drawn_at_two_moments_with_arrows_and_the_colour_of_ro
     assert says in figure.axes[1].get_title()
 
 
-def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
+def test_the_pair_over_the_load_has_both_members_which_meet_at_the_onset():
     """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx). Its discriminant is linear, so that curves between a few loads
     are exact, and both branches meet at the onset."""
     fx, fx_c = np.linspace(0, 0.03, 8), 0.02
@@ -215,21 +201,7 @@ def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
                 wanted = np.sort([part(1 + s * np.sqrt(fx_c - at + 0j)) for s in (-1, 1)], axis=0)[(sign + 1) // 2]
                 np.testing.assert_allclose(value, wanted, atol=1e-8)  # the root of what rounding leaves of D
             np.testing.assert_array_equal(dots.get_xdata(), fx)
-            assert fx_c in line.get_xdata()
-    upper = imaginary.child_axes[0].lines[1]
-    beyond = (upper.get_xdata() > 1e-9) & np.isfinite(upper.get_ydata())
-    np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-2 * upper.get_xdata()[beyond]), rtol=1e-9)
-    assert draw_pair([replace(curve, fx_c=None)]).axes[1].child_axes == []
-
-
-def test_a_pair_that_is_lost_has_no_imaginary_part():
-    """A complex nan has the imaginary part 0 in NumPy, which would be drawn as a stable pair."""
-    eigenvalues = np.array([[1, 2], [1.2, 1.8], [np.nan, np.nan], [1, 2], [1, 3]], dtype=complex)
-    curve = PairCurve(1.0, np.arange(5.0), eigenvalues, None)
-    assert np.isnan(curve.imaginary[2]).all()
-    fine = curve.smooth()
-    assert not np.any((fine.fx > 1) & (fine.fx < 3))
-    np.testing.assert_array_equal(np.isnan(fine.imaginary), np.isnan(fine.real))
+            assert np.abs(line.get_xdata() - fx_c).min() < 1e-12
 
 
 def test_most_arrows_of_a_mode_are_as_long_as_a_radius(pyramid):

@@ -6,7 +6,7 @@ from scipy.linalg import eigvals
 
 from faultgouge.analysis import find_onset
 from faultgouge.analysis.motion.eigenvalues import unit_rounding
-from faultgouge.analysis.windows import full_operator
+from faultgouge.analysis.windows import System
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 from faultgouge.pywrap.runs.scene_path import scene_path
@@ -28,7 +28,7 @@ def test_no_pair_is_complex_below_the_first_window():
         below = np.linspace(0, onset.fx_c - distance, 5)
         imaginary = []
         for fx in [*below, onset.fx_c + distance]:
-            matrix = full_operator(path(float(fx)))
+            matrix = System.of(path(float(fx))).stiffness
             imaginary.append(np.abs(eigvals(matrix.toarray(), check_finite=False).imag).max())
     # A double eigenvalue is uncertain by the root of u |A| times its coupling, which is of order 1.
     noise = 10 * np.sqrt(unit_rounding(matrix.data))

@@ -1,9 +1,9 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
-`FORMATS` has a line for each format: the module that reads and writes it, imported when a file of the format is used. A
-reader returns columns, a `ParticleTable`; `packing_of` makes a packing of disks, and `upper_layer` finds the layer that
-carries the load. `settling.relax` brings a packing out of balance to rest. A writer takes `Exported`, the columns of a
-Packing or of a Configuration.
+`FORMATS` has a line for each format that is read, and `WRITERS` one for each that is written: the function of the
+module that does it, imported when a file of the format is used. A reader returns `Disks`; `packing_of` makes a packing
+of them, and `upper_layer` finds the layer that carries the load. `settling.relax` brings a packing out of balance to
+rest. A writer takes `Exported`, the columns of a Packing or of a Configuration.
 """
 
 from __future__ import annotations
@@ -21,20 +21,12 @@ from ...configuration import Configuration
 from ...counted import counted
 from ...errors import BadInputError, PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import HDF5, SEAL, open_plain, open_text, telling
-from .disks import Disks, ParticleTable, Slips, UpperLayerError, disks_of, packing_of, upper_layer
-from .exported import (
-    Frame,
-    ModeVectors,
-    choose_frames,
-    exported_configuration,
-    exported_packing,
-    frames_of,
-    motion_of_mode,
-)
+from ..atomic_write import HDF5, SEAL, begins_with, open_text, telling
+from .disks import Disks, Slips, in_plane, packing_of, upper_layer
+from .exported import Exported, ModeVectors, choose_frames, exported, frames_of
 
 __all__ = [
-    "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
+    "Disks", "ModeVectors", "Slips", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 
@@ -51,39 +43,34 @@ class Format(NamedTuple):
     ----------
     words : str
         What it is.
-    module, reader : str
-        The module of this package, and its function. Restarts are read by LAMMPS itself, in pywrap.
+    reader : str
+        Module of this package, and function. Restarts are read by LAMMPS itself, in pywrap.
     suffixes : tuple of str
         Of files. Of a format that the first line tells, what that line is.
     frames : bool
         Whether a file may hold several frames.
-    text : bool
-        Whether a file may be compressed by gzip, and its name end in .gz.
     """
 
     words: str
-    module: str
     reader: str
     suffixes: tuple[str, ...]
     frames: bool = False
-    text: bool = True
 
 
-DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", "read_data", (".data",))
-DUMP = Format("LAMMPS dump", "lammps_dump", "read_custom_dump", (".dump", ".lammpstrj"), frames=True)
-RESTART = Format("LAMMPS restart", "", "", (".restart",), text=False)
-YADE = Format("YADE's text", "tables", "read_yade", ("line 1 is #format x_y_z_r",))
-MERCURY = Format("MercuryDPM's data", "tables", "read_mercury", (".data, line 1 is N time bounds",), frames=True)
-MDANALYSIS = Format("what MDAnalysis reads with radii", "libraries", "read_universe", (), frames=True)
+DATA = Format("LAMMPS data (atom style sphere)", "lammps_data.read_data", (".data",))
+DUMP = Format("LAMMPS dump", "lammps_dump.read_custom_dump", (".dump", ".lammpstrj"), frames=True)
+RESTART = Format("LAMMPS restart", "", (".restart",))
+YADE = Format("YADE's text", "tables.read_yade", ("line 1 is #format x_y_z_r",))
+MERCURY = Format("MercuryDPM's data", "tables.read_mercury", (".data, line 1 is N time bounds",), frames=True)
 FORMATS = (
-    Format("dumps of the decks", "lammps_dump", "read_deck_dump", (".disks",), frames=True, text=False),
-    Format("extended XYZ", "xyz", "read_xyz", (".xyz", ".extxyz"), frames=True),
+    Format("dumps of the decks", "lammps_dump.read_deck_dump", (".disks",), frames=True),
+    Format("extended XYZ", "xyz.read_xyz", (".xyz", ".extxyz"), frames=True),
     DATA,
     DUMP,
     RESTART,
-    Format("tables", "tables", "read_table", (".csv", ".txt")),
-    Format("packing.json", "tables", "read_json", (".json",)),
-    Format("GSD", "libraries", "read_gsd", (".gsd",), frames=True, text=False),
+    Format("tables", "tables.read_table", (".csv", ".txt")),
+    Format("packing.json", "tables.read_json", (".json",)),
+    Format("GSD", "gsd_file.read_gsd", (".gsd",), frames=True),
     YADE,
     MERCURY,
 )
@@ -92,18 +79,11 @@ told by the first line, whatever the name is; MercuryDPM's files have the suffix
 
 READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
 WRITERS = {
-    ".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd"),
-    ".data": ("lammps_data", "write_data"), ".csv": ("tables", "write_contacts"), ".pvd": ("vtp", "write_pvd"),
+    ".vtp": "vtp.write_vtp", ".xyz": "xyz.write_xyz", ".gsd": "gsd_file.write_gsd", ".data": "lammps_data.write_data",
+    ".csv": "tables.write_contacts", ".pvd": "vtp.write_pvd",
 }  # fmt: skip
 """Module and function by suffix; of one packing all but the last, and `FILMS` of several frames."""
 FILMS = ".xyz", ".gsd", ".pvd"
-WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
-
-
-def begins_with(path: Path, *beginnings: bytes) -> bool:
-    """Whether a file begins in one of some ways; OSError if it cannot be read."""
-    with open_plain(path) as stream:
-        return stream.read(64).startswith(beginnings)
 
 
 def is_hdf5(path: Path) -> bool:
@@ -129,9 +109,8 @@ def format_of(path: Path) -> Format:
     if len(words) in (6, 8) and ".data" in path.name.lower() and all(map(WORD_OF_NUMBER.fullmatch, words)):
         return MERCURY
     suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
-    found = READERS.get(suffix.lower())
-    if found is not None and (suffix == path.suffix or found.text):
-        return found
+    if suffix.lower() in READERS:
+        return READERS[suffix.lower()]
     if begins_with(path, RESTART_BEGINNING):
         return RESTART
     begin = path.name.split(".")[0].lower()
@@ -139,17 +118,13 @@ def format_of(path: Path) -> Format:
         return DATA if begin == "data" else DUMP
     if is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    from MDAnalysis import _PARSERS
-
-    if path.suffix.lower() != ".h5" and path.suffix[1:].upper() in _PARSERS:  # .h5 is our own, in `mdanalysis`
-        return MDANALYSIS
     names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
-    others = f"each text also as .gz, run.h5, LAMMPS decks (.in, in.NAME), and {MDANALYSIS.words}"
+    others = "each text also as .gz, run.h5, and LAMMPS decks (.in, in.NAME)"
     raise PackingFileError(f"{path} is of no format that is read: give {names}, {others}.")
 
 
-def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
-    """Read the particles in a file of another code.
+def read_particles(path: Path, frame: int | None = None) -> Disks:
+    """Read the particles in a file of another code, disks or spheres.
 
     Parameters
     ----------
@@ -171,29 +146,28 @@ def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     with telling(path, f"is not read as {found.words}"):
-        read: ParticleTable = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
+        read: Disks = _function(found.reader)(path, *([frame] if found.frames else []))
     return read
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:
     """Read the disks in a file of another code; as `read_particles`, and they must lie in a plane."""
-    return disks_of(read_particles(path, frame))
+    return in_plane(read_particles(path, frame))
 
 
-def _function(module: str, name: str) -> Any:
-    return getattr(import_module(f".{module}", __package__), name)
+def _function(name: str) -> Any:
+    module, function = name.split(".")
+    return getattr(import_module(f".{module}", __package__), function)
 
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
     taken = FILMS if frames else tuple(WRITERS)[:-1]
-    if path.suffix == ".pvd" and not frames:
-        raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
     if path.suffix not in taken:
-        what = "several frames go into" if frames else "exports are"
-        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}; give it one of these suffixes.")
-    if modes and (flat := WITHOUT_MODES.get(path.suffix)):
-        raise BadInputError(f"-o {path}: {flat} has no room for modes; leave --mode out, or export .vtp or .xyz.")
+        what, more = ("several frames go into", "") if frames else ("exports are", "; for a .pvd add --frames all")
+        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}{more}; give it one of these suffixes.")
+    if modes and path.suffix in (".data", ".csv"):
+        raise BadInputError(f"-o {path}: it has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
 def write_packing(
@@ -228,20 +202,15 @@ def write_packing(
         If the file cannot be written.
     """
     check_writer(path, bool(modes))
-    if alone := isinstance(packing, Packing):
-        exported = exported_packing(Frame(packing), modes)
-    else:
-        exported = exported_configuration(packing, modes)
-    exported.particles.update(values or {})
-    words: str = _function(*WRITERS[path.suffix])(path, [(0.0, exported)])
-    if path.suffix in WITHOUT_MODES or (alone and path.suffix != ".vtp"):
-        return words
-    touching = packing.configuration.contacts.touching
-    what = {"disk" if alone else "particle": len(packing), "contact": len(touching), "mode": len(modes)}
-    return ", ".join(counted(number, noun) for noun, number in what.items())
+    found = exported(packing, modes)
+    found.particles.update(values or {})
+    says: str = _function(WRITERS[path.suffix])(path, [(0.0, found)])
+    noun = "disk" if packing.dimension == 2 else "sphere"
+    what = {noun: len(packing), "contact": len(found.ends), "mode": len(modes)}
+    return "; ".join([", ".join(counted(number, each) for each, number in what.items()), *([says] if says else [])])
 
 
-def write_frames(path: Path, frames: Iterable[Frame]) -> None:
+def write_frames(path: Path, frames: Iterable[tuple[float, Exported]]) -> None:
     """Write the frames of a ramp or of an undamped run (`frames_of`) for another code; the suffix is the format.
 
     Raises
@@ -252,24 +221,4 @@ def write_frames(path: Path, frames: Iterable[Frame]) -> None:
         If the file cannot be written.
     """
     check_writer(path, frames=True)
-    _function(*WRITERS[path.suffix])(path, ((float(each.time), exported_packing(each)) for each in frames))
-
-
-def write_mode_frames(
-    path: Path, configuration: Configuration, mode: ModeVectors, count: int, periods: int = 1
-) -> None:
-    """Write the motion of a mode, growth left out, as a film of frames.
-
-    Parameters
-    ----------
-    count, periods : int
-        Frames, and whole periods of the mode in them.
-
-    Raises
-    ------
-    BadInputError, OutputError
-        As of `write_frames`.
-    """
-    check_writer(path, frames=True)
-    frames = motion_of_mode(configuration, mode, count, periods)
-    _function(*WRITERS[path.suffix])(path, ((float(k), frame) for k, frame in enumerate(frames)))
+    _function(WRITERS[path.suffix])(path, frames)

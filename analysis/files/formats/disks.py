@@ -1,7 +1,7 @@
-"""What a file of another code holds: particles in columns, disks in a plane, and the packing of these under a law.
+"""What a file of another code holds: particles by columns, disks in a plane, and the packing of these under a law.
 
-A reader returns columns, a `ParticleTable`, whatever their names are in the format. `sorted_columns` interprets them
-once for all formats, and refuses impossible numbers. `disks_of` makes disks: if a file lacks masses, angles, slips or
+A reader hands its columns, whatever their names are in the format, to `particles_of`, which interprets them once for
+all formats, and refuses impossible numbers. `in_plane` takes them as disks: if a file lacks masses, angles, slips or
 the period, the mass is 1, angles and slips are 0, and the sides are open. `packing_of` refuses disks below the floor,
 or with a centre inside another disk. `upper_layer` selects the layer by a number of disks, a type, IDs, a group, or a
 region, in one line of text.
@@ -12,13 +12,15 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Indices
+from ...counted import counted
 from ...errors import BadInputError, PackingFileError
 from ...packing.contacts import FLOOR, Contacts
 from ...packing.geometry import nearest_image, neighbour_tree, touching
@@ -36,9 +38,6 @@ LAYER_WAYS = (
 
 LEAST_TOUCHING_SHARE = 0.5
 """Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
-
-MOST_NAMES = 10
-"""Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
 REGION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
@@ -61,18 +60,15 @@ def standard_names(columns: Mapping[str, Floats]) -> dict[str, Floats]:
     return named | {name: column for name, column in lower.items() if name not in ALIASES}
 
 
-@dataclass(frozen=True, eq=False)
-class Slips:
+class Slips(NamedTuple):
     """Slips of contacts, by the IDs of their disks.
 
     Attributes
     ----------
     first, second : ndarray of int, shape (C,)
         IDs; a second ID of 0 is the floor.
-    slip : ndarray, shape (C,)
-        Along tau, length.
-    low : ndarray, shape (C,), or None
-        Their low parts.
+    slip, low : ndarray, shape (C,)
+        Along tau, length; and low parts if there are any.
     complete : bool
         Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
     """
@@ -85,20 +81,38 @@ class Slips:
 
 
 @dataclass(frozen=True, eq=False)
-class FileContents:
-    """What a file of another code says, besides its particles.
+class Disks:
+    """Disks from a file, or from a loose random packing, sorted by ID; or spheres from a file.
 
     Attributes
     ----------
     source : str
         The file and the place in it, or another origin of the particles.
+    position : ndarray, shape (N, 2), of spheres (N, 3)
+        Centres, length.
+    radius : ndarray, shape (N,)
+        Radii, length.
+    id : ndarray of int, shape (N,)
+        IDs of the file, or from 1.
+    mass, angle, kind, top, position_low : ndarray or None
+        Mass, orientation, type, whether in the upper layer, low parts of the centres; None if absent.
+    box_length : float or None
+        Period along x; None if the sides are open.
+    types, groups : mapping
+        Particles of each type by its name, where types have names, and of each group, as booleans.
+    box : ndarray, shape (3, 3), or None
+        Its edges in rows, length; None where the file has none.
+    origin : ndarray, shape (3,)
+        Its lower corner, length.
+    periodic : sequence of bool, or None
+        Along each edge; None where the file does not say, and disks are taken as periodic along x.
+    first_id : int
+        Number of the first particle, in a code that counts from 0.
     slips : Slips or None
         None if the file has none.
     given : mapping
         Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
         fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
-    groups : mapping
-        Groups of particles by name, as booleans, sorted by ID.
     remark : str
         Information that the format has lost, or units that it has; empty for none.
     length_unit : str
@@ -106,61 +120,6 @@ class FileContents:
     """
 
     source: str
-    slips: Slips | None = field(default=None, kw_only=True)
-    given: Mapping[str, float] = field(default_factory=dict, kw_only=True)
-    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, kw_only=True)
-    remark: str = field(default="", kw_only=True)
-    length_unit: str = field(default="", kw_only=True)
-
-
-@dataclass(frozen=True, eq=False)
-class ParticleTable(FileContents):
-    """What a reader finds in a file.
-
-    Attributes
-    ----------
-    columns : mapping of ndarray, each of shape (N,)
-        Numbers by name.
-    box : ndarray, shape (3, 3), or None
-        Its edges in rows, length; None where the file has none.
-    origin : ndarray, shape (3,), or None
-        Its lower corner; zero by default.
-    periodic : sequence of bool, or None
-        Along each edge; None where the file does not say, and disks are taken as periodic along x.
-    type_names : sequence of str
-        Of each particle, where types have names.
-    first_id : int
-        Number of the first particle, in a code that counts from 0.
-    """
-
-    columns: Mapping[str, Floats]
-    box: Floats | None = None
-    origin: Floats | None = None
-    periodic: Sequence[bool] | None = None
-    type_names: Sequence[str] = ()
-    first_id: int = 1
-
-
-@dataclass(frozen=True, eq=False)
-class Disks(FileContents):
-    """Disks from a file, or from a loose random packing, sorted by ID.
-
-    Attributes
-    ----------
-    position : ndarray, shape (N, 2)
-        Centres, length.
-    radius : ndarray, shape (N,)
-        Radii, length.
-    id : ndarray of int, shape (N,)
-        IDs of the file, or from 1.
-    mass, angle, kind, top, position_low : ndarray or None
-        Mass, orientation, type, whether a disk belongs to the upper layer, low parts of the centres; None if absent.
-    box_length : float or None
-        Period along x; None if the sides are open.
-    types : mapping
-        Disks of each type by its name, as booleans, where types have names.
-    """
-
     position: Floats
     radius: Floats
     id: Indices
@@ -171,6 +130,15 @@ class Disks(FileContents):
     position_low: Floats | None = None
     box_length: float | None = None
     types: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    box: Floats | None = None
+    origin: Floats = field(default_factory=lambda: np.zeros(3))
+    periodic: Sequence[bool] | None = None
+    first_id: int = 1
+    slips: Slips | None = None
+    given: Mapping[str, float] = field(default_factory=dict)
+    remark: str = ""
+    length_unit: str = ""
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -195,23 +163,39 @@ def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
     return wanted % len(counts)
 
 
-def sorted_columns(found: ParticleTable) -> tuple[dict[str, Floats], Indices]:
-    """The columns by standard names, sorted by ID, with radius, id and, of a density, mass; and their order.
+def particles_of(
+    source: object, columns: Mapping[str, Floats], box: Floats | None = None, *, type_names: Sequence[str] = (),
+    first_id: int = 1, **more: Any,
+) -> Disks:  # fmt: skip
+    """Particles of some columns.
 
-    Raises PackingFileError if a column is missing, or holds what it cannot hold.
+    Parameters
+    ----------
+    source : str or Path
+        What a sentence about them begins with.
+    columns : mapping of ndarray, each of shape (N,)
+        Numbers by name, in any order of the particles.
+    type_names : sequence of str
+        Of each particle, where types have names.
+    **more
+        Further fields of `Disks`.
+
+    Raises
+    ------
+    PackingFileError
+        If a column is missing, or holds what it cannot hold.
     """
-    source, columns = found.source, standard_names(found.columns)
-    if "diameter" in columns:
-        columns.setdefault("radius", 0.5 * columns["diameter"])
+    c = standard_names(columns)
+    if "diameter" in c:
+        c.setdefault("radius", 0.5 * c["diameter"])
     for name in ("x", "y", "radius"):
-        if name not in columns:
-            has = ", ".join(found.columns) or "none"
-            also = " or diameter" if name == "radius" else ""
+        if name not in c:
+            has, also = ", ".join(columns) or "none", " or diameter" if name == "radius" else ""
             raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
-    if not len(columns["x"]):
+    if not len(c["x"]):
         raise PackingFileError(f"{source} has no particles.")
-    ids = columns.setdefault("id", np.arange(len(columns["x"]), dtype=np.float64) + np.float64(found.first_id))
-    for name, column in columns.items():
+    ids = c.setdefault("id", np.arange(len(c["x"]), dtype=np.float64) + np.float64(first_id))
+    for name, column in c.items():
         odd, says = ~np.isfinite(column), "which is no number"
         if name in ("radius", "mass", "density"):
             odd, says = odd | (column <= 0), "and must be above 0"
@@ -222,41 +206,35 @@ def sorted_columns(found: ParticleTable) -> tuple[dict[str, Floats], Indices]:
     order = np.argsort(ids, kind="stable")
     for twice in ids[order][1:][np.diff(ids[order]) == 0]:
         raise PackingFileError(f"{source} has particle {twice:g} twice: give each an ID of its own.")
-    if ids[order][0] < found.first_id:
-        raise PackingFileError(f"{source}: IDs must be {found.first_id} or more, and one is {ids[order][0]:g}.")
-    if "density" in columns:
-        columns.setdefault("mass", mass_of_density(columns["density"], columns["radius"]))
-    return {name: column[order] for name, column in columns.items()}, order
-
-
-def disks_of(found: ParticleTable) -> Disks:
-    """The disks that a reader has found; a PackingFileError if they do not lie in a plane, or as `sorted_columns`."""
-    source, (c, order) = found.source, sorted_columns(found)
-    z = c.get("z", np.zeros(1))
-    if np.ptp(z) > FLATNESS * c["radius"].min():
-        says = f"it is of three dimensions (z goes from {z.min():g} to {z.max():g}), and is read as disks in a plane"
-        raise PackingFileError(f"{source}: {says}; for spheres give --material, or `faultgouge import DECK.in`.")
-    period = None
-    if found.box is not None:
-        if np.count_nonzero(found.box - np.diag(np.diag(found.box))):
-            raise PackingFileError(f"{source} has a tilted box: give one with right angles.")
-        if found.box[0, 0] > 0 and (found.periodic is None or found.periodic[0]):
-            period = float(found.box[0, 0])
-    names = np.array(found.type_names)[order] if len(found.type_names) else np.array([])
+    if ids[order][0] < first_id:
+        raise PackingFileError(f"{source}: IDs must be {first_id} or more, and one is {ids[order][0]:g}.")
+    if "density" in c:
+        c.setdefault("mass", mass_of_density(c["density"], c["radius"]))
+    c = {name: column[order] for name, column in c.items()}
+    names = np.array(type_names)[order] if len(type_names) else np.array([])
+    sides = more.get("periodic")
+    closes = box is not None and box[0, 0] > 0 and (sides is None or sides[0])
     return Disks(
-        source,
-        np.column_stack([c["x"], c["y"]]),
-        c["radius"],
-        c["id"].astype(np.int64) + (1 - found.first_id),  # 0 is the floor
-        c.get("mass"),
-        c.get("angle"),
-        c["type"].astype(np.int64) if "type" in c else None,
-        c["top"] != 0 if "top" in c else None,
-        np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
-        period,
-        types={str(name): names == name for name in dict.fromkeys(names.tolist())},
-        **{each.name: getattr(found, each.name) for each in fields(FileContents) if each.name != "source"},
-    )
+        str(source), np.column_stack([c[axis] for axis in ("xyz" if "z" in c and np.ptp(c["z"]) else "xy")]),
+        c["radius"], c["id"].astype(np.int64), c.get("mass"), c.get("angle"),
+        kind=c["type"].astype(np.int64) if "type" in c else None,
+        top=c["top"] != 0 if "top" in c else None,
+        position_low=np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
+        box_length=float(box[0, 0]) if box is not None and closes else None,
+        types={str(name): names == name for name in dict.fromkeys(names.tolist())}, box=box, first_id=first_id, **more,
+    )  # fmt: skip
+
+
+def in_plane(found: Disks) -> Disks:
+    """Particles as disks, with IDs from 1; a PackingFileError if they do not lie in a plane."""
+    place, box = found.position, found.box
+    if place.shape[1] == 3 and np.ptp(place[:, 2]) > FLATNESS * found.radius.min():
+        low, high = place[:, 2].min(), place[:, 2].max()
+        says = f"it is of three dimensions (z goes from {low:g} to {high:g}), and is read as disks in a plane"
+        raise PackingFileError(f"{found.source}: {says}; for spheres give --material, or `faultgouge import DECK.in`.")
+    if box is not None and np.count_nonzero(box - np.diag(np.diag(box))):
+        raise PackingFileError(f"{found.source} has a tilted box: give one with right angles.")
+    return replace(found, position=place[:, :2].copy(), id=found.id + (1 - found.first_id))  # 0 is the floor
 
 
 def sphere_volume(radius: Floats) -> Floats:
@@ -267,8 +245,8 @@ def sphere_volume(radius: Floats) -> Floats:
 def mass_of_density(density: Floats, radius: Floats) -> Floats:
     """Masses of spheres, as they were before LAMMPS wrote their densities with 16 digits.
 
-    A mass of one may come back as 0.9999999999999999. A mass is therefore the number of twelve digits, if there is one
-    within the rounding of its density; else it is that which LAMMPS reads, to the bit.
+    A mass is the number of twelve digits, if there is one within the rounding of its density; else that which LAMMPS
+    reads, to the bit: a mass of one may come back as 0.9999999999999999.
     """
     volume = sphere_volume(radius)
     mass = density * volume
@@ -282,10 +260,6 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 
     Parameters
     ----------
-    disks : Disks
-        From a reader.
-    law : MindlinLaw
-        Of all contacts.
     top : ndarray of bool, shape (N,)
         The upper layer.
     **load : float
@@ -294,44 +268,35 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
     Returns
     -------
     Packing
-        With slips that are not known, if there are contacts with friction, and the file does not give their slips.
+        With slips that are not known, if there is friction, and the file does not give the slips of the contacts.
 
     Raises
     ------
     PackingFileError
         If disks lie below the floor or inside one another, or form no packing.
     """
-    with telling(disks.source, "describes no possible packing", (ValueError,)):
-        _check_places(disks)
-        contacts = _contacts(disks, law)
-        names = ("position", "radius", "angle", "mass", "box_length", "position_low")
-        fields = load | {name: getattr(disks, name) for name in names}
+    place, radius, period, source = disks.position, disks.radius, disks.box_length, disks.source
+    with telling(source, "describes no possible packing", ValueError):
+        for k in np.flatnonzero(place[:, 1] <= 0):
+            says = f"the centre of disk {disks.id[k]} is at y = {place[k, 1]:g}, and the floor is y = 0"
+            raise PackingFileError(f"{source}: {says}: say with --floor at which y it is.")
+        pairs = neighbour_tree(place, period).query_pairs(float(radius.max()), output_type="ndarray")
+        distance = np.hypot(*nearest_image(place[pairs[:, 0]] - place[pairs[:, 1]], period).T)
+        for k in np.flatnonzero(distance < np.maximum(*radius[pairs].T)):
+            says = f"disks {disks.id[pairs[k, 0]]} and {disks.id[pairs[k, 1]]} are {distance[k]:g} apart"
+            raise PackingFileError(f"{source}: {says}, the centre of one in the other: separate them.")
+        contacts = touching(place, radius, period)
+        if disks.slips is not None and law.frictional:
+            contacts = _slipped(contacts, disks, disks.slips)
         known = disks.slips_known or not law.frictional or len(contacts) == 0
-        return Packing(contacts=contacts, law=law, top=top, slips_known=known, **fields)
+        fields: dict[str, Any] = {
+            name: getattr(disks, name) for name in ("position", "radius", "angle", "mass", "position_low")
+        }
+        return Packing(contacts=contacts, law=law, top=top, slips_known=known, box_length=period, **(fields | load))
 
 
-def _check_places(disks: Disks) -> None:
-    below = disks.position[:, 1] <= 0
-    if below.any():
-        says = (
-            f"the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and the floor is y = 0"
-        )
-        raise PackingFileError(f"{disks.source}: {says}: say with --floor at which y it is.")
-    tree = neighbour_tree(disks.position, disks.box_length)
-    pairs = tree.query_pairs(float(disks.radius.max()), output_type="ndarray")
-    apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
-    distance = np.hypot(*apart.T)
-    for k in np.flatnonzero(distance < np.maximum(*disks.radius[pairs].T)):
-        a, b = disks.id[pairs[k]]
-        says = f"disks {a} and {b} are {distance[k]:g} apart, the centre of one in the other: separate them"
-        raise PackingFileError(f"{disks.source}: {says}.")
-
-
-def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
-    """All contacts, with the slips of the file, of which disks that do not touch may have none."""
-    near, slips = touching(disks.position, disks.radius, disks.box_length), disks.slips
-    if slips is None or not law.frictional:
-        return near
+def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
+    """Contacts with the slips of the file, of which disks that do not touch may have none."""
     ids = np.array([slips.first, slips.second])
     ends = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
     for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
@@ -342,23 +307,16 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     if slips.complete:
         return listed
     known = {pair: k for k, pair in enumerate(zip(near.i.tolist(), near.j.tolist(), strict=True))}
-    pairs = zip(listed.i.tolist(), listed.j.tolist(), strict=True)
-    where = np.array([known.get(pair, -1) for pair in pairs], dtype=np.int64)
-    lost = np.flatnonzero((where < 0) & (listed.slip != 0))
-    if len(lost):
-        a, b = int(listed.i[lost[0]]), int(listed.j[lost[0]])
-        second, reach = (disks.position[b], disks.radius[b]) if b >= 0 else (disks.position[a] * (1, 0), 0.0)
-        gap = np.hypot(*nearest_image(disks.position[a] - second, disks.box_length)) - disks.radius[a] - reach
-        other, many = disks.id[b] if b >= 0 else "the floor", "slip is" if len(lost) == 1 else "slips are"
-        says = f"{len(lost)} {many} of disks that do not touch: {disks.id[a]} and {other} are {gap:.3g} apart"
+    slip, lost = np.zeros(len(near)), []
+    for first, second, size in zip(listed.i.tolist(), listed.j.tolist(), listed.slip.tolist(), strict=True):
+        if (first, second) in known:
+            slip[known[first, second]] = size
+        elif size:
+            lost.append(f"{disks.id[first]} and {disks.id[second] if second >= 0 else 'the floor'}")
+    if lost:
+        says = f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0]}"
         raise PackingFileError(f"{disks.source}: {says}: leave such rows out, or give places and radii that touch.")
-    slip = np.zeros(len(near))
-    slip[where[where >= 0]] = listed.slip[where >= 0]
     return near.slipped(slip)
-
-
-class UpperLayerError(BadInputError):
-    """The upper layer is not given, or its text is not understood, or names what a file does not have."""
 
 
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
@@ -366,8 +324,6 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 
     Parameters
     ----------
-    disks : Disks
-        From a reader.
     says : str or int, optional
         A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
         (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
@@ -382,24 +338,20 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 
     Raises
     ------
-    UpperLayerError
+    BadInputError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
     text = "" if says is None else str(says).strip()
     if says is None and disks.top is None:
         unsaid = f"{disks.source} does not say which disks are the upper layer"
-        raise UpperLayerError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
     except (OSError, ValueError) as error:
-        raise UpperLayerError(f"{key}{text}: {error}.") from None
+        raise BadInputError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
-        y = disks.position[:, 1]
-        types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
-        kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
-        source = disks.source
-        layer = f"{source}: its own column top" if says is None else f"{key}{text}: this layer of {source}"
-        raise UpperLayerError(f"{layer} holds no disk: its disks go from y = {y.min():g} to {y.max():g}{kinds}.")
+        y, layer = disks.position[:, 1], "its own column top" if says is None else f"{key}{text}"
+        raise BadInputError(f"{disks.source}: {layer} holds no disk; they go from y = {y.min():g} to {y.max():g}.")
     return chosen
 
 
@@ -410,18 +362,19 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
         if int(text) > len(disks):
             raise ValueError(f"{disks.source} has {len(disks)} disks alone")
         order = np.argsort(-disks.position[:, 1], kind="stable")
-        held = ~touching_nothing(disks)[order]
+        with telling(disks.source, "describes no possible packing", ValueError):
+            contacts = touching(disks.position, disks.radius, disks.box_length)
+        held = np.isin(order, [contacts.i, contacts.j])
         if held.sum() >= max(int(text), LEAST_TOUCHING_SHARE * len(disks)):
             order = order[held]
         return np.isin(np.arange(len(disks)), order[: int(text)])
     if kind in ("type", "group") and value:
-        by_name = disks.types if kind == "type" else disks.groups
-        if value in by_name:
-            return by_name[value]
-        if kind == "type" and value.isdecimal() and disks.kind is not None:
-            return np.asarray(disks.kind == int(value))
-        numbers = "numbers, as in type:2" if kind == "type" and disks.kind is not None else "none"
-        raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(by_name) or numbers})")
+        known = dict(disks.types if kind == "type" else disks.groups)
+        if kind == "type" and disks.kind is not None:
+            known = {str(number): disks.kind == number for number in np.unique(disks.kind).tolist()} | known
+        if value not in known:
+            raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(known) or 'none'})")
+        return known[value]
     if kind == "ids" and value:
         wanted = set[int]()
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
@@ -437,28 +390,3 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
     if None in parts:
         raise ValueError(f"it is none of {LAYER_WAYS}")
     return np.all([OPERATORS[each[2]](values[each[1]], float(each[3])) for each in parts if each], axis=0)
-
-
-def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
-    """Disks that touch neither another disk nor the floor, shape (N,)."""
-    with telling(disks.source, "describes no possible packing", (ValueError,)):
-        contacts = touching(disks.position, disks.radius, disks.box_length)
-    return ~np.isin(np.arange(len(disks)), [contacts.i, contacts.j])
-
-
-def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
-    """A remark on disks that touch nothing, in the layer or above it; empty for none, or too many."""
-
-    def listed(which: NDArray[np.bool_]) -> str:
-        ids = disks.id[which].tolist()
-        return ", ".join(map(str, ids[:MOST_NAMES])) + (", ..." if len(ids) > MOST_NAMES else "")
-
-    alone = touching_nothing(disks)
-    above = alone & (disks.position[:, 1] > disks.position[layer, 1].min())
-    if alone.mean() > 1 - LEAST_TOUCHING_SHARE:
-        return ""
-    if (loose := layer & alone).any():
-        return f"{loose.sum()} of the {layer.sum()} disks of the upper layer touch nothing: {listed(loose)}"
-    if says is not None and says.strip().isdecimal() and above.any():
-        return f"--top {says} leaves out {above.sum()} of the highest disks, which touch nothing: {listed(above)}"
-    return ""

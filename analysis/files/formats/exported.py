@@ -7,11 +7,11 @@ the floor, and low parts of compensated packings are a fourth column.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from ...packing.contacts import Contacts
 from ...packing.geometry import nearest_image, touching
 from ...packing.packing import Packing
 from ...responses.hysteresis import turning_points
+from ..atomic_write import FORMAT_KEY, check_format
 from ..runfile import RunFile, law_parameters
 from .disks import Slips
 
@@ -33,12 +34,8 @@ PARAMETER_NAMES = {
 }  # fmt: skip
 """Names of law, load and inertia in files; and slips_known, 0 where the slips are not known."""
 
-LARGEST_EXPORTED = 0.5
-"""Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
 
-
-@dataclass(frozen=True, eq=False)
-class ModeVectors:
+class ModeVectors(NamedTuple):
     """A mode of a packing for an export.
 
     Attributes
@@ -56,30 +53,7 @@ class ModeVectors:
     displacement: NDArray[np.complex128]
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A packing for an export, alone or as a frame of a film.
-
-    Attributes
-    ----------
-    packing : Packing
-        The packing. If it is not `whole`, its contacts are all disks that touch, without slips.
-    time : float
-        F_x of an equilibrium, or the total path of F_x on a ramp with turning points; or the time of an undamped run.
-    displacement : ndarray, shape (N, 2), or None
-        Displacement from the first frame of a film, length.
-    whole : bool
-        Whether angles and slips, and so the forces, are known: an undamped run stores only positions.
-    """
-
-    packing: Packing
-    time: float = 0.0
-    displacement: Floats | None = None
-    whole: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Exported:
+class Exported(NamedTuple):
     """The columns of an export.
 
     Attributes
@@ -117,86 +91,83 @@ class Exported:
     rows: Floats | None = None
 
 
-def exported_packing(frame: Frame, modes: Sequence[ModeVectors] = ()) -> Exported:
-    """The columns of a Packing; those of slips and of forces that follow from them where they are known."""
-    p, c, n = frame.packing, frame.packing.contacts, len(frame.packing)
-    g, first = p.geometry, p.position[c.i]
+def exported(
+    source: Packing | Configuration,
+    modes: Sequence[ModeVectors] = (),
+    displacement: Floats | None = None,
+    time: float | None = None,
+) -> Exported:
+    """The columns of a packing.
+
+    Parameters
+    ----------
+    displacement : ndarray, shape (N, 2), optional
+        Of a Packing since the first frame of a film, length.
+    time : float, optional
+        Of a frame of an undamped run, of which positions alone are known: the contacts of the Packing are then all
+        disks that touch, and there are neither slips nor forces that follow from them.
+    """
+    if isinstance(source, Configuration):
+        return _of_configuration(source, modes)
+    p, c, g, n = source, source.contacts, source.geometry, len(source)
     particles: dict[str, NDArray] = {"id": np.arange(1, n + 1), "radius": p.radius, "mass": p.mass}
     particles |= {"top": p.top.astype(np.int64), "normal_force": _at_particles(np.add, n, c, p.normal_force)}
     contacts: dict[str, NDArray] = {"contact_i": c.i, "contact_j": c.j}
     contacts |= {"contact_normal_force": p.normal_force, "contact_overlap": g.overlap}
-    if frame.whole:
+    rows = None
+    if time is None:
         force = p.net_force.reshape(3, -1).T
-        particles |= {"angle": p.angle, "net_force": in_space(force[:, :2]), "torque_over_radius": force[:, 2]}
+        particles |= {"angle": p.angle, "net_force": _in_space(force[:, :2]), "torque_over_radius": force[:, 2]}
         particles["mobilised"] = _at_particles(np.maximum, n, c, p.mobilised)
         both = p.normal_force[:, None] * g.normal + p.tangential_force[:, None] * g.tangent
-        contacts |= {"contact_force": in_space(both), "contact_tangential_force": p.tangential_force}
+        contacts |= {"contact_force": _in_space(both), "contact_tangential_force": p.tangential_force}
         contacts |= {"contact_slip": c.slip, "contact_mobilised": p.mobilised}
-    if frame.displacement is not None:
-        particles["displacement"] = in_space(frame.displacement)
+        low = [] if c.slip_low is None else [c.slip_low]
+        rows = np.column_stack([c.i + 1, c.j + 1, c.slip, *low]).astype(np.float64)
+    if displacement is not None:
+        particles["displacement"] = _in_space(displacement)
     if p.position_low is not None:
         particles |= {"x_low": p.position_low[:, 0], "y_low": p.position_low[:, 1]}
-    for mode in modes:
-        for part, vectors in _parts_of(mode):
-            particles |= {f"{mode.name}{part}": in_space(vectors[:2].T), f"{mode.name}{part}_rotation": vectors[2]}
-    numbers = scalars(p) | ({} if p.box_length is None else {"box_length": p.box_length})
-    numbers |= ({} if frame.whole else {"time": frame.time}) | _eigenvalues(modes)
+    particles |= _of_modes(modes, lambda vectors: (_in_space(vectors[:2].T), vectors[2]))
+    more = {"tau": p.drag_time, "slips_known": None if p.slips_known else 0.0, "fx": p.fx, "fy": p.fy}
+    more |= {"inertia_factor": p.inertia_factor, "box_length": p.box_length, "time": time}
+    numbers = law_parameters(p.law) | {name: value for name, value in more.items() if value is not None}
     largest, height = 2 * p.radius.max(), (p.position[:, 1] + p.radius).max()
     width = 2 * np.ptp(p.position[:, 0]) + largest if p.box_length is None else p.box_length
-    ends = in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1))
+    first = p.position[c.i]
+    ends = _in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1))
     box, sides = np.diag([width, height, largest]), (p.box_length is not None, False, False)
-    rows = contact_rows(p) if frame.whole else None
-    return Exported(p, in_space(p.position), particles, contacts, ends, numbers, box, sides, rows=rows)
+    numbers |= _eigenvalues(modes)
+    return Exported(p, _in_space(p.position), particles, contacts, ends, numbers, box, sides, rows=rows)
 
 
-def exported_configuration(
-    configuration: Configuration, modes: Sequence[ModeVectors] = (), displacement: Floats | float = 0.0
-) -> Exported:
-    """The columns of a Configuration; particles may be displaced, with the contacts that they have at rest.
-
-    Parameters
-    ----------
-    displacement : ndarray, shape (N, 3), optional
-        In space, length.
-    """
-    own, c, n = configuration, configuration.contacts.touching, len(configuration)
-    touches = ~own.contacts.couple
-    rest = np.pad(own.position, ((0, 0), (0, 3 - own.dimension)))
-    moved = np.broadcast_to(displacement, rest.shape)
+def _of_configuration(own: Configuration, modes: Sequence[ModeVectors]) -> Exported:
+    c, n, touches = own.contacts.touching, len(own), ~own.contacts.couple
+    place = np.pad(own.position, ((0, 0), (0, 3 - own.dimension)))
     particles: dict[str, NDArray] = {"radius": own.radius, "mass": own.mass, "id": own.ids, "type": own.kind}
     particles |= {"free": own.free.astype(np.float64), "load": own.load[:, 0]}
     particles |= {"net_force": own.net_force[:, 0], "net_torque": own.net_force[:, 1]}
     particles["normal_force"] = _at_particles(np.add, n, c, c.normal_force)
     particles["coordination"] = _at_particles(np.add, n, c, np.ones(len(c)))
-    for mode in modes:
-        for part, vectors in _parts_of(mode):
-            names = f"{mode.name}{part}", f"{mode.name}{part}_rotation"
-            particles |= dict(zip(names, own.vectors(vectors), strict=True))
-    second = np.maximum(c.j, 0)
-    contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i], "contact_j": np.where(c.wall, 0, own.ids[second])}
+    particles |= _of_modes(modes, own.vectors)
+    second = np.where(c.wall, 0, own.ids[np.maximum(c.j, 0)])
+    contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i], "contact_j": second}
     contacts["contact_force"] = c.normal_force[:, None] * c.normal + c.tangential_force
     contacts |= {f"contact_{name}": getattr(c, name) for name in ("normal_force", "tangential_force", "overlap")}
     contacts["contact_mobilised"] = own.mobilised[touches]
-    other = rest[c.i] - own.branch[touches] + np.where(c.wall[:, None], 0.0, moved[second])
-    ends = np.stack([rest[c.i] + moved[c.i], other], axis=1)
-    box, sides = own.box, tuple(map(bool, own.periodic))
-    return Exported(own, rest + moved, particles, contacts, ends, _eigenvalues(modes), box, sides, own.origin)
+    ends = np.stack([place[c.i], place[c.i] - own.branch[touches]], axis=1)
+    sides = tuple(map(bool, own.periodic))
+    return Exported(own, place, particles, contacts, ends, _eigenvalues(modes), own.box, sides, own.origin)
 
 
-def motion_of_mode(configuration: Configuration, mode: ModeVectors, count: int, periods: int = 1) -> Iterator[Exported]:
-    """The motion of a mode, growth left out: frames with displaced particles, their displacement and rotation."""
-    reach = LARGEST_EXPORTED * configuration.radius.min() / max(1.0, np.abs(mode.displacement).max())
-    for k in range(count):
-        moved = np.real(reach * mode.displacement * np.exp(2j * np.pi * periods * k / count))
-        there = ModeVectors("displacement", mode.eigenvalue, moved.astype(np.complex128))
-        yield exported_configuration(configuration, [there], configuration.vectors(moved)[0])
-
-
-def _parts_of(mode: ModeVectors) -> Iterator[tuple[str, Floats]]:
-    """The real part of a mode, and, if it has one, the imaginary part, with what is added to their names."""
-    yield "", mode.displacement.real
-    if np.any(mode.displacement.imag):
-        yield "_imag", mode.displacement.imag
+def _of_modes(modes: Sequence[ModeVectors], apart: Callable[[Floats], tuple[NDArray, NDArray]]) -> dict[str, NDArray]:
+    """Columns of vectors and rotations, into which `apart` takes coordinates; imaginary parts where there are any."""
+    found = {}
+    for name, _, moved in modes:
+        for part, coordinates in {"": moved.real, "_imag": moved.imag}.items():
+            if not part or coordinates.any():
+                found[f"{name}{part}"], found[f"{name}{part}_rotation"] = apart(coordinates)
+    return found
 
 
 def _eigenvalues(modes: Sequence[ModeVectors]) -> dict[str, float]:
@@ -204,37 +175,32 @@ def _eigenvalues(modes: Sequence[ModeVectors]) -> dict[str, float]:
     return {f"{mode.name}{name}": float(part(mode.eigenvalue)) for mode in modes for name, part in parts}
 
 
-def scalars(packing: Packing) -> dict[str, float]:
-    """Law, load and inertia by name, without absent values and defaults."""
-    values = law_parameters(packing.law) | ({} if packing.drag_time is None else {"tau": packing.drag_time})
-    values |= {} if packing.slips_known else {"slips_known": 0.0}
-    return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
+def read_back(
+    path: Path, values: Mapping[str, Any], rows: Sequence[float] | Floats | None, low: bool
+) -> dict[str, Any]:
+    """Fields `given` and `slips` of Disks, of the numbers and the `Exported.rows` in a file, which may be another's.
 
-
-def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """The values of `PARAMETER_NAMES` in a mapping, as far as these are numbers."""
-    found = {}
+    Parameters
+    ----------
+    values : mapping
+        What the file has by name, law and load among these.
+    low : bool
+        Whether rows have low parts of slips.
+    """
+    check_format(values.get(FORMAT_KEY), path)
+    given = {}
     for key in PARAMETER_NAMES & values.keys():
         with suppress(TypeError, ValueError):
-            found[key] = float(values[key])
-    return found
+            given[key] = float(values[key])
+    if rows is None:
+        return {"given": given}
+    columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
+    first, second = columns[:2].astype(np.int64)
+    slips = Slips(first, second, columns[2], columns[3] if low else None, complete=True)
+    return {"given": given, "slips": slips}
 
 
-def contact_rows(packing: Packing) -> Floats:
-    """Rows (first ID, second ID, slip[, low part]), shape (C, 3 or 4); IDs from 1, 0 is the floor."""
-    c = packing.contacts
-    low = [] if c.slip_low is None else [c.slip_low]
-    return np.column_stack([c.i + 1, c.j + 1, c.slip, *low]).astype(np.float64)
-
-
-def slips_of(numbers: Sequence[float] | Floats, compensated: bool) -> Slips:
-    """The reverse of `contact_rows`, of its numbers in a row."""
-    rows = np.reshape(np.asarray(numbers, dtype=np.float64), (-1, 4 if compensated else 3))
-    first, second = rows[:, :2].T.astype(np.int64)
-    return Slips(first, second, rows[:, 2], rows[:, 3] if compensated else None, complete=True)
-
-
-def in_space(vectors: Floats) -> Floats:
+def _in_space(vectors: Floats) -> Floats:
     """Vectors in the plane with z = 0, shape (..., 3)."""
     return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 1)])
 
@@ -255,17 +221,19 @@ def choose_frames(run: RunFile, says: str) -> range:
     total = len(run)
     if "trajectory" in run.names_of_series:
         total = 1 + len(run.series("trajectory")["time"])
-    if says != "all" and not re.fullmatch(r"(-?\d+)?:(-?\d+)?(:(-?[1-9]\d*)?)?", says):
-        raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.")
-    numbers = [int(part) if part else None for part in says.replace("all", ":").split(":")]
-    found = range(total)[slice(*numbers)]
+    try:
+        start, stop, *step = (int(part) if part else None for part in says.replace("all", ":").split(":"))
+        found = range(total)[slice(start, stop, *step)]
+    except (ValueError, TypeError):
+        raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.") from None
     if not found:
         raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
     return found
 
 
-def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
-    """The frames of a run.h5, one after the other: of its undamped run if it has its trajectory, else of its ramp.
+def frames_of(run: RunFile, numbers: range) -> Iterator[tuple[float, Exported]]:
+    """Times and frames of a run.h5, one after the other: of its undamped run if it has its trajectory, else of its
+    ramp, whose time is F_x, or the total path of F_x where there are turning points.
 
     Parameters
     ----------
@@ -291,4 +259,4 @@ def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
         moved = nearest_image(packing.position - start.position, packing.box_length)
         if packing.position_low is not None and start.position_low is not None:
             moved = moved + (packing.position_low - start.position_low)
-        yield Frame(packing, time, moved, whole=not undamped)
+        yield time, exported(packing, displacement=moved, time=time if undamped else None)

@@ -12,17 +12,17 @@ end of its line, because there may be no density that gives the mass to the last
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import takewhile
+from itertools import dropwhile, takewhile
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
-from ...configuration import Configuration
 from ...errors import PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, write_text
-from .disks import ParticleTable, sphere_volume
-from .exported import Exported, contact_rows, pick_numbers, scalars, slips_of
+from ..atomic_write import FORMAT, FORMAT_KEY, write_text
+from .disks import Disks, particles_of, sphere_volume
+from .exported import Exported, read_back
 from .tables import columns_of, lines_of, numbers_in, strip_comments
 
 HEADER_COMMENT = "# faultgouge"
@@ -30,7 +30,7 @@ CONTACT_COMMENT = "# contact"
 SPHERE_COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
 
 
-def read_data(path: Path) -> ParticleTable:
+def read_data(path: Path) -> Disks:
     """Particles of a data file. The file does not say whether x is periodic: it is taken to be, with its width."""
     lines = lines_of(path)
     start = next((k for k, line in enumerate(lines) if line.split()[:1] == ["Atoms"]), None)
@@ -41,30 +41,27 @@ def read_data(path: Path) -> ParticleTable:
         raise PackingFileError(f"{path} is of atom style {style}, which has no radii: write it with atom_style sphere.")
     header = {}
     for _, words in strip_comments(lines[:start], 1):  # numbers, and their names behind them
-        first = next((k for k, word in enumerate(words) if word[0].isalpha()), len(words))
-        if 0 < first < len(words):
-            header[" ".join(words[first:])] = numbers_in(" ".join(words[:first]), path)
+        names = list(dropwhile(lambda word: not word[0].isalpha(), words))
+        if 0 < len(names) < len(words):
+            header[" ".join(names)] = numbers_in(" ".join(words[: -len(names)]), path)
     rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), strip_comments(lines[start + 1 :], start + 2)))
     columns = columns_of(path, rows, SPHERE_COLUMNS, f"7 are needed: {', '.join(SPHERE_COLUMNS)}")
     if len(rows) != header["atoms"][0]:
         raise PackingFileError(f"{path} announces {header['atoms'][0]:g} atoms, and {len(rows)} are there.")
     low, high = np.transpose([header[f"{axis}lo {axis}hi"] for axis in "xyz"])
-    box = np.diag(high - low)
+    box, more = np.diag(high - low), dict[str, Any]()
     box[1, 0], *box[2, :2] = header.get("xy xz yz", np.zeros(3))
     marked = next((line for line in lines[:start] if f"{HEADER_COMMENT} " in line), None)
-    if marked is None:
-        return ParticleTable(str(path), columns, box, low)
-    # a file that faultgouge wrote
-    comments = [(number, lines[number - 1].partition("#")[2].split()) for number, _ in rows]
-    names = ("mass", "angle", "x_low", "y_low")[: len(comments[0][1])]
-    columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
-    columns["top"] = columns["type"] - 1
-    values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
-    check_format(values.get(FORMAT_KEY), path)
-    contacts = [line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)]
-    slips = slips_of(numbers_in(" ".join(contacts), path), "x_low" in columns)
-    sides = (values.get("sides") == "p", False, False)
-    return ParticleTable(str(path), columns, box, low, sides, given=pick_numbers(values), slips=slips)
+    if marked is not None:  # a file that faultgouge wrote
+        comments = [(number, lines[number - 1].partition("#")[2].split()) for number, _ in rows]
+        names = ["mass", "angle", "x_low", "y_low"][: len(comments[0][1])]
+        columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
+        columns["top"] = columns["type"] - 1
+        values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
+        contacts = [line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)]
+        more = read_back(path, values, numbers_in(" ".join(contacts), path), "x_low" in columns)
+        more["periodic"] = (values.get("sides") == "p", False, False)
+    return particles_of(path, columns, box, origin=low, **more)
 
 
 def write_data(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -72,50 +69,48 @@ def write_data(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
 
     That of a Packing is read back to the bit by `read_data`; of a Configuration it has the particles alone.
     """
-    [(_, exported)] = frames
-    if isinstance(exported.source, Configuration):
-        return _write_spheres(path, exported.source)
-    packing = exported.source
-    volume = sphere_volume(packing.radius)
-    density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
-    numbers = " ".join(f"{key}={value!r}" for key, value in scalars(packing).items())
-    sides = "f" if packing.box_length is None else "p"
-    lines = [f"{HEADER_COMMENT} {FORMAT_KEY}={FORMAT} sides={sides} {numbers}", "", f"{len(packing)} atoms"]
-    lines += ["2 atom types", *box_lines(packing), ""]
-    # behind the numbers of the header: readers look for these in the first lines to know the format
-    for first, second, *slips in contact_rows(packing).tolist():
-        lines.append(" ".join([CONTACT_COMMENT, str(int(first)), str(int(second)), *map(repr, slips)]))
-    lines += ["", "Atoms # sphere", ""]
-    low = [] if packing.position_low is None else list(packing.position_low.T)
-    columns = [packing.top, 2 * packing.radius, density, *packing.position.T, packing.mass, packing.angle, *low]
-    for n, (top, d, rho, x, y, *more) in enumerate(zip(*(each.tolist() for each in columns), strict=True), 1):
-        lines.append(f"{n} {1 + top} {d!r} {rho!r} {x!r} {y!r} 0.0 # " + " ".join(map(repr, more)))
-    write_text(path, "\n".join(lines) + "\n")
-    inexact = np.sum(density * volume != packing.mass)
-    odd = f" ({inexact} masses with a last bit of their own)" if inexact else ""
-    return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"
-
-
-def _write_spheres(path: Path, c: Configuration) -> str:
-    (xx, *_), (xy, yy, _), (xz, yz, zz) = c.box.tolist()
-    low, rest = c.origin.tolist(), np.pad(c.position, ((0, 0), (0, 3 - c.dimension)))
-    box = [f"{a!r} {a + size!r} {axis}lo {axis}hi" for axis, a, size in zip("xyz", low, (xx, yy, zz), strict=True)]
-    tilt = [f"{xy!r} {xz!r} {yz!r} xy xz yz"] if any((xy, xz, yz)) else []
-    lines = [f"# {FORMAT_KEY}={FORMAT}", "", f"{len(c)} atoms", f"{c.kind.max()} atom types", *box, *tilt, ""]
-    columns = [c.ids, c.kind, 2 * c.radius, c.mass / sphere_volume(c.radius), *rest.T]
+    [(_, e)] = frames
+    mass, volume = e.particles["mass"], sphere_volume(e.particles["radius"])
+    density = mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
+    kinds = e.particles["type"] if e.rows is None else 1 + e.particles["top"]
+    columns = [e.particles["id"], kinds, 2 * e.particles["radius"], density, *e.position.T]
     rows = [" ".join(map(repr, row)) for row in zip(*(each.tolist() for each in columns), strict=True)]
-    write_text(path, "\n".join([*lines, "Atoms # sphere", "", *rows]) + "\n")
-    return "places, radii, masses and types; contacts, laws and loads are not in it"
+    if e.rows is None:
+        (xx, *_), (xy, yy, _), (xz, yz, zz) = e.box.tolist()
+        low = (np.zeros(3) if e.origin is None else e.origin).tolist()
+        box = _sides((a, a + size) for a, size in zip(low, (xx, yy, zz), strict=True))
+        box += [f"{xy!r} {xz!r} {yz!r} xy xz yz"] if any((xy, xz, yz)) else []
+        head, contacts, types = f"# {FORMAT_KEY}={FORMAT}", [], kinds.max()
+        says = "LAMMPS reads places, radii, masses and types; contacts, laws and loads are not in it"
+    else:
+        numbers = " ".join(f"{key}={value!r}" for key, value in e.numbers.items() if key != "box_length")
+        head = f"{HEADER_COMMENT} {FORMAT_KEY}={FORMAT} sides={'p' if e.periodic[0] else 'f'} {numbers}"
+        box, types = box_lines(cast("Packing", e.source)), 2
+        # behind the numbers of the header: readers look for these in the first lines to know the format
+        contacts = [f"{CONTACT_COMMENT} {int(i)} {int(j)} {' '.join(map(repr, s))}" for i, j, *s in e.rows.tolist()]
+        contacts.append("")
+        behind = [mass, *(e.particles[name] for name in ("angle", "x_low", "y_low") if name in e.particles)]
+        more = zip(*(each.tolist() for each in behind), strict=True)
+        rows = [f"{row} # {' '.join(map(repr, own))}" for row, own in zip(rows, more, strict=True)]
+        inexact = np.sum(density * volume != mass)
+        odd = f" ({inexact} masses with a last bit of their own)" if inexact else ""
+        says = f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"
+    lines = [head, "", f"{len(rows)} atoms", f"{types} atom types", *box, "", *contacts, "Atoms # sphere", "", *rows]
+    write_text(path, "\n".join(lines) + "\n")
+    return says
 
 
 def box_lines(packing: Packing) -> list[str]:
     """The box of a data file, with room around the disks."""
     x, period, margin = packing.position[:, 0], packing.box_length, 4 * packing.radius.max()
-    left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
+    across = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
     # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
     thickness = float(packing.radius.min())
-    sides = zip("xyz", ((left, right), box_heights(packing), (-thickness, thickness)), strict=True)
-    return [f"{float(low)!r} {float(high)!r} {axis}lo {axis}hi" for axis, (low, high) in sides]
+    return _sides((across, box_heights(packing), (-thickness, thickness)))
+
+
+def _sides(ends: Iterable[tuple[float, float]]) -> list[str]:
+    return [f"{float(low)!r} {float(high)!r} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", ends, strict=True)]
 
 
 def box_heights(packing: Packing) -> tuple[float, float]:

@@ -10,19 +10,19 @@ are neither slips nor angles, and their columns may be missing. Low parts are th
 
 Law, load and inertia are not part of a dump. They are given by the caller or by a file of the same name with the suffix
 ".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
-inertia_factor. Values from the caller take precedence.
+inertia_factor. A law from the caller takes precedence.
 
 Of a dump custom, columns are x or xu or xs, radius or diameter, and, if present, id, type, mass, theta. Several
 snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
 """
 
 from collections import deque
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
@@ -34,14 +34,13 @@ from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text, telling
 from ..runfile import law_of_parameters
-from .disks import ALIASES, ParticleTable, Slips, choose_frame, disks_of, packing_of, standard_names
+from .disks import ALIASES, Disks, Slips, choose_frame, in_plane, packing_of, particles_of, standard_names
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
 
 
-@dataclass(frozen=True, eq=False)
-class DumpFrame:
+class DumpFrame(NamedTuple):
     """One snapshot of a LAMMPS text dump.
 
     Attributes
@@ -64,6 +63,11 @@ class DumpFrame:
     columns: tuple[str, ...]
     rows: Floats
 
+    @property
+    def named(self) -> dict[str, Floats]:
+        """The columns by their standard names."""
+        return standard_names(dict(zip(self.columns, self.rows.T, strict=True)))
+
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
     """The snapshots of a LAMMPS text dump, one after the other.
@@ -71,7 +75,7 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
     Raises PackingFileError if the file is missing, or breaks off or is malformed before the snapshot asked for is
     complete.
     """
-    unread, broken = telling(path, "cannot be read", (OSError,)), telling(path, "is not a complete LAMMPS text dump")
+    unread, broken = telling(path, "cannot be read", OSError), telling(path, "is not a complete LAMMPS text dump")
     with unread, open_text(path) as file, broken:
         while (frame := _next_frame(file)) is not None:
             yield frame
@@ -87,13 +91,13 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
         if item[1] not in ("ATOMS", "ENTRIES"):
             about[item[1]] = [line, *(next(file) for _ in range(3 if item[1] == "BOX" else 1))]
             continue
-        count, columns = int(about["NUMBER"][1]), tuple(item[2:])
+        count, names = int(about["NUMBER"][1]), tuple(item[2:])
         lines = list(islice(file, count))
-        rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(len(lines), len(columns))
+        rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(len(lines), len(names))
         if len(lines) < count:
             raise ValueError(f"{count} rows are announced and {len(lines)} are there")
         bounds = np.array([each.split() for each in about["BOX"][1:]], dtype=np.float64)
-        return DumpFrame(int(about["TIMESTEP"][1]), tuple(about["BOX"][0].split()[-3:]), bounds, columns, rows)
+        return DumpFrame(int(about["TIMESTEP"][1]), tuple(about["BOX"][0].split()[-3:]), bounds, names, rows)
     if "TIMESTEP" in about:
         raise ValueError("it breaks off")
     return None
@@ -112,7 +116,7 @@ def _snapshot(path: Path, frame: int | None) -> DumpFrame:
     return kept[0]
 
 
-def _particles(path: Path, shown: DumpFrame, columns: Mapping[str, Floats]) -> ParticleTable:
+def _disks(path: Path, shown: DumpFrame, columns: dict[str, Floats]) -> Disks:
     """Columns in the box of a snapshot; scaled coordinates are taken to places."""
     low, high = shown.bounds[:, :2].T.copy()
     xy, xz, yz = shown.bounds[:, 2] if shown.bounds.shape[1] > 2 else np.zeros(3)
@@ -121,67 +125,49 @@ def _particles(path: Path, shown: DumpFrame, columns: Mapping[str, Floats]) -> P
     high -= [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
     box = np.diag(high - low)
     box[1, 0], box[2, :2] = xy, (xz, yz)
-    columns, axes = dict(columns), "xyz"
-    shares = {axis: columns[name] for axis in axes for name in (f"{axis}su", f"{axis}s") if name in columns}
+    shares = {axis: columns[name] for axis in "xyz" for name in (f"{axis}su", f"{axis}s") if name in columns}
     if {"x", "y"} <= shares.keys() - columns.keys():
-        share = np.column_stack([shares.get(axis, np.zeros(len(shown.rows))) for axis in axes])
-        columns |= dict(zip(axes, (low + share @ box).T, strict=True))
-    periodic = [each.startswith("p") for each in shown.boundary] if len(shown.boundary) == 3 else None
-    return ParticleTable(f"{path} (step {shown.step})", columns, box, low, periodic)
+        share = np.column_stack([shares.get(axis, np.zeros(len(shown.rows))) for axis in "xyz"])
+        columns |= dict(zip("xyz", (low + share @ box).T, strict=True))
+    sides = [each.startswith("p") for each in shown.boundary] if len(shown.boundary) == 3 else None
+    return particles_of(f"{path} (step {shown.step})", columns, box, origin=low, periodic=sides)
 
 
-def read_custom_dump(path: Path, frame: int | None = None) -> ParticleTable:
+def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
     """A snapshot of `dump custom`; the last one by default, if all are of the same particles."""
     shown = _snapshot(path, frame)
-    return _particles(path, shown, standard_names(dict(zip(shown.columns, shown.rows.T, strict=True))))
+    return _disks(path, shown, shown.named)
 
 
-def read_dump(
-    disks: str | PathLike[str],
-    contacts: str | PathLike[str] | None = None,
-    *,
-    frame: int = -1,
-    law: MindlinLaw | None = None,
-    fx: float | None = None,
-    fy: float | None = None,
-    inertia_factor: float | None = None,
-) -> Packing:
+def read_dump(disks: str | PathLike[str], *, frame: int = -1, law: MindlinLaw | None = None) -> Packing:
     """Read a packing from the dumps of an input deck.
 
     Parameters
     ----------
     disks : path
-        The dump of disks.
-    contacts : path, optional
-        The dump of contacts; by default the file with the name of the dump of disks and the suffix ".contacts".
+        The dump of disks; that of contacts has its name and the suffix ".contacts".
     frame : int
         Number of the snapshot; negative numbers count from the end. Contacts are read from the snapshot of the same
         time step.
-    law, fx, fy, inertia_factor : optional
-        As in :class:`~faultgouge.analysis.Packing`; by default those of the file ``.params``; without this file, no
-        load and inertia factor 1. The law then has no default.
+    law : MindlinLaw, optional
+        By default that of the file ``.params``, as load, drag and inertia are; without this file there is no load, and
+        the inertia factor is 1.
 
     Raises
     ------
     PackingFileError
         If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
-    found = disks_of(read_deck_dump(Path(disks), frame, contacts, law))
+    found = in_plane(read_deck_dump(Path(disks), frame, law))
     assert found.top is not None
-    own = {"fx": fx, "fy": fy, "inertia_factor": inertia_factor}
-    load = {name: found.given.get(name) if value is None else value for name, value in own.items()}
-    known = {name: value for name, value in load.items() if value is not None}
-    return packing_of(
-        found, law or law_of_parameters(found.given), found.top, drag_time=found.given.get("tau"), **known
-    )
+    names = {"fx": "fx", "fy": "fy", "inertia_factor": "inertia_factor", "tau": "drag_time"}
+    load = {name: found.given[key] for key, name in names.items() if key in found.given}
+    return packing_of(found, law or law_of_parameters(found.given), found.top, **load)
 
 
-def read_deck_dump(
-    path: Path, frame: int | None = None, contacts: str | PathLike[str] | None = None, law: MindlinLaw | None = None
-) -> ParticleTable:
+def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None = None) -> Disks:
     """Read a dump of write.in, with the slips of all contacts in its .contacts, and the numbers in its .params."""
-    beside = path.with_suffix(".contacts") if contacts is None else Path(contacts)
-    sidecar = path.with_suffix(".params")
+    beside, sidecar = path.with_suffix(".contacts"), path.with_suffix(".params")
     shown, given = _snapshot(path, -1 if frame is None else frame), _numbers_in(sidecar)
     try:
         law = law or law_of_parameters(given)
@@ -190,35 +176,31 @@ def read_deck_dump(
     pairs = next((each for each in dump_frames(beside) if each.step == shown.step), None)
     if pairs is None:
         raise PackingFileError(f"{beside} has no snapshot of step {shown.step}.")
-    absent = set() if law.frictional else {"angle", "floor_slip", "slip"}
-    disk = _columns(path, shown, {"id", "type", "x", "y", "radius", "mass", "angle", "floor_slip"}, absent)
-    pair = _columns(beside, pairs, {"id1", "id2", "slip"}, absent)
+    disk = _columns(path, shown, law, "id", "type", "x", "y", "radius", "mass", "angle", "floor_slip")
+    pair = _columns(beside, pairs, law, "id1", "id2", "slip")
     disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
     if "x_low" in disk:
         place, low = exact_sum(*(np.column_stack([disk[f"{axis}{part}"] for axis in "xy"]) for part in ("", "_low")))
         disk |= dict(zip(("x", "y", "x_low", "y_low"), (*place.T, *low.T), strict=True))
-    found = _particles(path, shown, disk | {"top": disk["type"] == TOP_TYPE})
-    ids, radius, position = disk["id"], disk["radius"], np.column_stack([disk["x"], disk["y"]])
+    found = _disks(path, shown, disk | {"top": disk["type"] == TOP_TYPE})
+    ids, radius, position = found.id, found.radius, found.position[:, :2]
     i, j = (np.minimum(np.searchsorted(ids, pair[each]), len(ids) - 1) for each in ("id1", "id2"))
     if np.any(ids[i] != pair["id1"]) or np.any(ids[j] != pair["id2"]):
         raise PackingFileError(f"{beside} has a contact of a disk that {path} does not have.")
-    period = float(found.box[0, 0]) if found.box is not None and found.periodic and found.periodic[0] else None
-    touch = np.hypot(*nearest_image(position[i] - position[j], period).T) < radius[i] + radius[j]
-    floor = radius > disk["y"]
-    first, second = np.column_stack([[ids[i[touch]], ids[j[touch]]], [ids[floor], 0 * ids[floor]]]).astype(np.int64)
-    slip, low_slip = (
-        np.append(pair[name][touch], disk[f"floor_{name}"][floor]) if name in pair else None
-        for name in ("slip", "slip_low")
-    )
-    assert slip is not None
-    return replace(found, given=given, slips=Slips(first, second, slip, low_slip, complete=True))
+    # LAMMPS lists pairs up to its cutoff
+    touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
+    floor = radius > position[:, 1]
+    first, second = np.append(ids[i[touch]], ids[floor]), np.append(ids[j[touch]], 0 * ids[floor])
+    parts = {"slip": "slip", "low": "slip_low"}.items()
+    slips = {part: np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for part, name in parts if name in pair}
+    return replace(found, given=given, slips=Slips(first, second, **slips, complete=True))
 
 
-def _columns(path: Path, frame: DumpFrame, needed: set[str], absent: set[str]) -> dict[str, Floats]:
-    """Columns by standard names; of those that may be absent, zeros."""
-    columns = standard_names(dict(zip(frame.columns, frame.rows.T, strict=True)))
-    columns = {name: np.zeros(len(frame.rows)) for name in absent & needed} | columns
-    for name in sorted(needed - columns.keys()):
+def _columns(path: Path, frame: DumpFrame, law: MindlinLaw, *needed: str) -> dict[str, Floats]:
+    """Columns by standard names; without friction zeros for those of slips and angles that are absent."""
+    zeros = () if law.frictional else ("angle", "floor_slip", "slip")
+    columns = {name: np.zeros(len(frame.rows)) for name in zeros if name in needed} | frame.named
+    for name in (each for each in needed if each not in columns):
         names = [name, *(other for other, standard in ALIASES.items() if standard == name)]
         raise PackingFileError(f"{path} has no column {' or '.join(names)}.")
     return columns
@@ -228,9 +210,8 @@ def _numbers_in(path: Path) -> dict[str, float]:
     """The numbers of a sidecar file; none where there is no such file."""
     if not path.is_file():
         return {}
-    with telling(path, "must have one key and one number a line", (ValueError,)):
+    with telling(path, "must have one key and one number a line", ValueError):
         lines = (line.split() for line in read_plain_text(path).splitlines() if line.strip())
         found = {key: float(value) for key, value in lines}
-    number = found.pop(FORMAT_KEY, None)
-    check_format(None if number is None else f"{number:g}", path)
+    check_format(found.pop(FORMAT_KEY, None), path)
     return found

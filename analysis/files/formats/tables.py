@@ -22,7 +22,7 @@ import csv
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import BadInputError, PackingFileError
 from ..atomic_write import open_text, telling, write_text
-from .disks import ALIASES, ParticleTable, Slips, choose_frame, standard_names
+from .disks import ALIASES, Disks, Slips, choose_frame, particles_of, standard_names
 from .exported import Exported
 from .lammps_dump import dump_frames
 
@@ -42,13 +42,10 @@ NUMBER_WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 HEADS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
 """Names of columns with blanks between them, each with its unit in brackets, if there is one."""
 
-UNIT_HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
-"""A name with a unit behind it in brackets."""
+HEAD = re.compile(r'\s*"?([^\[("]*?)"?\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?"?\s*')
+"""A name, and a unit behind it in brackets."""
 
 DECIMAL_COMMA = re.compile(r"^(\s*[-+]?\d*),(\d*(?:[eE][-+]?\d+)?\s*)$")
-
-NO_UNIT = ("", "-", "1")
-"""Texts in brackets that are no unit."""
 
 LENGTHS = ("x", "y", "z", "radius", "diameter", "x_low", "y_low", "slip", "slip_low")
 
@@ -60,6 +57,9 @@ MERCURY_ROWS = {
     14: ["x", "y", "z", None, None, None, "radius", *6 * [None], "type"],
 }
 """MercuryDPM's columns, by their number; info is its index of the species."""
+
+HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
+"""How a table of contacts begins."""
 
 
 def lines_of(path: Path) -> list[str]:
@@ -86,10 +86,8 @@ def numbers_in(text: str, where: object) -> list[float]:
 
 def strip_comments(lines: Iterable[str], first: int) -> Iterator[tuple[int, list[str]]]:
     """Lines by number, as the words before a #; lines without a word are left out."""
-    for number, line in enumerate(lines, first):
-        words = line.partition("#")[0].split()
-        if words:
-            yield number, words
+    rows = ((number, line.partition("#")[0].split()) for number, line in enumerate(lines, first))
+    return (row for row in rows if row[1])
 
 
 def columns_of(
@@ -106,14 +104,12 @@ def columns_of(
     more : bool
         Whether a line may have more columns than there are names.
     """
-    rows = []
+    kept, rows = [k for k, name in enumerate(names) if name is not None], []
     for number, words in lines:
         if len(words) < len(names) or not (more or len(words) == len(names)):
             raise PackingFileError(f"{path}, line {number}: it has {len(words)} columns, and {wanted}.")
-        named = (word for word, name in zip(words, names, strict=False) if name is not None)
-        rows.append([number_of(word, f"{path}, line {number}") for word in named])
-    found = [name for name in names if name is not None]
-    return dict(zip(found, np.array(rows).reshape(-1, len(found)).T, strict=True))
+        rows.append([number_of(words[k], f"{path}, line {number}") for k in kept])
+    return {str(names[k]): column for k, column in zip(kept, np.array(rows).reshape(-1, len(kept)).T, strict=True)}
 
 
 def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -> tuple[int, int]:
@@ -122,8 +118,7 @@ def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -
     A frame begins with its number of particles; they follow after `head` lines. `frame` is as of `choose_frame`.
     """
     end = max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
-    counts: dict[int, int] = {}
-    at = 0
+    counts, at = dict[int, int](), 0
     while at < end:
         counts[at] = int(lines[at].split()[0])
         at += head + counts[at]
@@ -133,12 +128,12 @@ def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -
     return begin, counts[begin]
 
 
-def read_table(path: Path) -> ParticleTable:
+def read_table(path: Path) -> Disks:
     """Particles of a CSV file; commas, semicolons, tabs or blanks between the numbers. Open sides."""
     columns, length, mass = _table(path)
     masses = f" and masses in {mass}" if mass else ""
     remark = f"lengths are in {length}{masses}: give law and load in these units" if length else ""
-    return ParticleTable(str(path), columns, remark=remark, length_unit=length)
+    return particles_of(path, columns, remark=remark, length_unit=length)
 
 
 def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
@@ -148,27 +143,38 @@ def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
     comment before them has the names.
     """
     rows = [(number, line) for number, line in enumerate(lines_of(path), 1) if line.strip()]
-    comments = [line.lstrip().startswith(("#", "//")) for _, line in rows]
-    first = comments.index(False) if False in comments else len(rows)
-    begins_with_number = first < len(rows) and re.match(r"\s*[-+.,\d]", rows[first][1])
-    heads = first - 1 if first and begins_with_number else first
-    body = [row for k, row in enumerate(rows) if k != heads and not comments[k]]
+    body = [row for row in rows if not row[1].lstrip().startswith(("#", "//"))]
+    first = rows.index(body[0]) if body else 0
+    if first and re.match(r"\s*[-+.,\d]", body[0][1]):
+        head = rows[first - 1][1]
+    else:
+        head, body = (body[0][1], body[1:]) if body else ("", [])
     if not body:
         raise PackingFileError(f"{path} is no table: give a line of names, as x,y,radius, and lines of numbers.")
-    head = rows[heads][1].strip().lstrip("#/").strip()
+    head = head.strip().lstrip("#/").strip()
     mark = next((each for each in ";,\t" if each in head), None)
     words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in body]
     if mark != ",":
         words = [(number, [DECIMAL_COMMA.sub(r"\1.\2", word) for word in each]) for number, each in words]
-    names, units = list[str | None](), dict[str, str]()
+    names, units = list[str](), dict[str, str]()
     for each in head.split(mark) if mark else HEADS.findall(head):
-        match = UNIT_HEAD.fullmatch(each)
-        name = (match[1] if match else each).strip().strip('"').strip().lower()
-        names.append(name)
-        if match and match[2] not in NO_UNIT:
-            units[ALIASES.get(name, name)] = match[2]
+        match = HEAD.fullmatch(each)
+        names.append((match[1] if match else each).strip().lower())
+        if match and match["unit"] not in (None, "", "-", "1"):
+            units[ALIASES.get(names[-1], names[-1])] = match["unit"]
     columns = standard_names(columns_of(path, words, names, f"the first {len(names)}", more=False))
-    return _in_one_unit(str(path), columns, units, length)
+    known, lacking = ([name for name in LENGTHS if name in columns and (name in units) is has] for has in (True, False))
+    if lacking and (known or length):
+        where = f"{known[0]} is in {units[known[0]]}" if known else f"the disks are in {length}"
+        raise PackingFileError(f"{path}: {where}, and {lacking[0]} has no unit: give every length one, or none.")
+    unit = length or (units[known[0]] if known else "")
+    mass = units.get("mass", "g" if "density" in units else "")
+    if "density" in units and not unit:
+        raise PackingFileError(f"{path}: density is in {units['density']}, and lengths have no unit: give one.")
+    into = dict.fromkeys(known, unit) | {"angle": "radian", "mass": mass, "density": f"{mass}/({unit})**3"}
+    for name in into.keys() & units.keys():
+        columns[name] = columns[name] * _factor(path, name, units[name], into[name])
+    return columns, unit, mass
 
 
 @cache
@@ -179,25 +185,7 @@ def unit_registry() -> Any:
     return UnitRegistry()
 
 
-def _in_one_unit(
-    source: str, columns: Mapping[str, Floats], units: Mapping[str, str], length: str
-) -> tuple[dict[str, Floats], str, str]:
-    """Columns whose lengths are all in one unit, that of the first by default; and the units of lengths and masses."""
-    lengths = [name for name in LENGTHS if name in columns]
-    known, lacking = [[name for name in lengths if (name in units) is has] for has in (True, False)]
-    if lacking and (known or length):
-        where = f"{known[0]} is in {units[known[0]]}" if known else f"the disks are in {length}"
-        raise PackingFileError(f"{source}: {where}, and {lacking[0]} has no unit: give every length one, or none.")
-    unit = length or (units[known[0]] if known else "")
-    mass = units.get("mass", "g" if "density" in units else "")
-    if "density" in units and not unit:
-        raise PackingFileError(f"{source}: density is in {units['density']}, and lengths have no unit: give one.")
-    into = dict.fromkeys(known, unit) | {"angle": "radian", "mass": mass, "density": f"{mass}/({unit})**3"}
-    factors = {name: _factor(source, name, units[name], to) for name, to in into.items() if name in units}
-    return {name: column * factors.get(name, 1.0) for name, column in columns.items()}, unit, mass
-
-
-def _factor(source: str, name: str, unit: str, into: str) -> float:
+def _factor(path: Path, name: str, unit: str, into: str) -> float:
     """Factor of the numbers of a column."""
     from pint import PintError
 
@@ -206,17 +194,18 @@ def _factor(source: str, name: str, unit: str, into: str) -> float:
         return float(f"{unit_registry().Quantity(1, unit).to(into).magnitude:.15g}")
     except (PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no unit"
-        says = f"the unit of {name}, {unit!r}, does not convert to {into}: {reason}."
-        raise PackingFileError(f"{source}: {says}") from None
+        raise PackingFileError(f"{path}: the unit of {name}, {unit!r}, does not convert to {into}: {reason}.") from None
 
 
 def contact_columns(
-    path: Path, length: str = "", frame: int = -1, names: Sequence[str] | None = None
+    path: Path, *needed: str, length: str = "", frame: int = -1, names: Sequence[str] | None = None
 ) -> dict[str, Floats]:
     """The columns of a table of contacts, in CSV or as a LAMMPS dump local, by standard names.
 
     Parameters
     ----------
+    *needed : str
+        Columns that must be there.
     length : str
         The unit of the particles' lengths, where their table has one.
     frame : int
@@ -236,21 +225,16 @@ def contact_columns(
         if len(names) != len(columns):
             raise BadInputError(f"--columns names {len(names)} columns, and {path} has {len(columns)}.")
         columns = dict(zip(names, columns.values(), strict=True))
-    return standard_names(columns)
-
-
-def require_columns(path: Path, columns: Mapping[str, Floats], *names: str) -> None:
-    """Refuse a table of contacts that lacks a column."""
-    for name in names:
-        if name not in columns:
-            has = f"its columns: {', '.join(columns)}; --columns names those of a dump local"
-            raise PackingFileError(f"{path} has no column {name} ({has}).")
+    columns = standard_names(columns)
+    for name in (each for each in needed if each not in columns):
+        has = f"its columns: {', '.join(columns)}; --columns names those of a dump local"
+        raise PackingFileError(f"{path} has no column {name} ({has}).")
+    return columns
 
 
 def read_slips(path: Path, length: str = "") -> Slips:
     """Slips of a table of contacts: id1, id2 (0 is the floor) and slip; `length` as of `contact_columns`."""
-    c = contact_columns(path, length)
-    require_columns(path, c, "id1", "id2", "slip")
+    c = contact_columns(path, "id1", "id2", "slip", length=length)
     return Slips(c["id1"].astype(np.int64), c["id2"].astype(np.int64), c["slip"], c.get("slip_low"))
 
 
@@ -265,11 +249,7 @@ def write_contacts(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     return "forces, overlaps and mobilised friction; `faultgouge import --contacts` takes the slips"
 
 
-HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
-"""How a table of contacts begins."""
-
-
-def read_json(path: Path) -> ParticleTable:
+def read_json(path: Path) -> Disks:
     """Disks of a packing.json, which came to rest without friction: no contact has a slip.
 
     It has the lists x, y, radius, and may have top (indices from 0, or true and false for each disk), mass (of each
@@ -287,11 +267,12 @@ def read_json(path: Path) -> ParticleTable:
         top = np.isin(np.arange(disks), top)
     if top.any():
         columns["top"] = top.astype(np.float64)
-    box, none = None if period is None else np.diag([float(period), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
-    return ParticleTable(str(path), columns, box, slips=Slips(none, none, np.zeros(0)))
+    none = np.zeros(0, dtype=np.int64)
+    box = None if period is None else np.diag([float(period), 1.0, 1.0])
+    return particles_of(path, columns, box, slips=Slips(none, none, np.zeros(0)))
 
 
-def read_yade(path: Path) -> ParticleTable:
+def read_yade(path: Path) -> Disks:
     """Spheres of a text file of YADE, which counts from 0; the sides are open."""
     head, *lines = lines_of(path)
     names = head.split()[-1].split("_")
@@ -302,10 +283,10 @@ def read_yade(path: Path) -> ParticleTable:
     columns = columns_of(path, rows, names, f"line 1 announces {len(names)}")
     short = all(len(word.lstrip("-0.").partition("e")[0]) <= SIX_DIGITS for _, words in rows for word in words[:4])
     remark = "its numbers have six digits, as YADE writes them: overlaps are lost below that" if short else ""
-    return ParticleTable(str(path), columns, first_id=0, remark=remark)
+    return particles_of(path, columns, first_id=0, remark=remark)
 
 
-def read_mercury(path: Path, frame: int | None = None) -> ParticleTable:
+def read_mercury(path: Path, frame: int | None = None) -> Disks:
     """Particles at one time, counted from 0; the last one by default, if all times have as many particles."""
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 1, frame)
@@ -316,4 +297,4 @@ def read_mercury(path: Path, frame: int | None = None) -> ParticleTable:
     if not np.array_equal(columns["type"], np.rint(columns["type"])):
         del columns["type"]  # info may be any number that the user wants to look at
     low, high = (np.append(side, [end])[:3] for side, end in ((low, 0.0), (high, 1.0)))
-    return ParticleTable(str(path), columns, np.diag(high - low), low, first_id=0)
+    return particles_of(path, columns, np.diag(high - low), origin=low, first_id=0)

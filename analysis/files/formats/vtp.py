@@ -24,10 +24,10 @@ Element = ElementTree.Element
 
 
 def write_vtp(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
-    """Write a .vtp file of one frame, and return the contents in words."""
+    """Write a .vtp file of one frame, of which nothing is left to say."""
     [(_, exported)] = frames
     write_whole(path, ElementTree.tostring(_page(exported), encoding="utf-8", xml_declaration=True))
-    return "particles and contacts in float64"
+    return ""
 
 
 def write_pvd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -44,28 +44,26 @@ def write_pvd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     return "displacements and what is known of forces"
 
 
-def _page(exported: Exported) -> Element:
-    n, count = len(exported.position), len(exported.ends)
+def _page(e: Exported) -> Element:
+    n, count = len(e.position), len(e.ends)
     root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
     data = ElementTree.SubElement(root, "PolyData")
     fields = ElementTree.SubElement(data, "FieldData")
-    for name, value in exported.numbers.items():
+    for name, value in e.numbers.items():
         _array(fields, name, np.array([value]), NumberOfTuples="1")
-    sizes = {"NumberOfPoints": n + 2 * count, "NumberOfVerts": n, "NumberOfLines": count}
-    sizes |= {"NumberOfStrips": 0, "NumberOfPolys": 0}
-    piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in sizes.items()})
-    parts = {
-        name: ElementTree.SubElement(piece, name) for name in ("PointData", "CellData", "Points", "Verts", "Lines")
-    }
-    for name, values in exported.particles.items():
+    sizes = {"Points": n + 2 * count, "Verts": n, "Lines": count, "Strips": 0, "Polys": 0}
+    piece = ElementTree.SubElement(data, "Piece", {f"NumberOf{key}": str(value) for key, value in sizes.items()})
+    points, cells, places = (ElementTree.SubElement(piece, name) for name in ("PointData", "CellData", "Points"))
+    for name, values in e.particles.items():
         ends = np.full((2 * count, *values.shape[1:]), 0.0 if name == "radius" else np.nan)
-        _array(parts["PointData"], name, np.concatenate([values, ends]))
-    for name, values in exported.contacts.items():
-        _array(parts["CellData"], name, np.concatenate([np.full((n, *values.shape[1:]), np.nan), values]))
-    _array(parts["Points"], "Points", np.concatenate([exported.position, exported.ends.reshape(-1, 3)]))
+        _array(points, name, np.concatenate([values, ends]))
+    for name, values in e.contacts.items():
+        _array(cells, name, np.concatenate([np.full((n, *values.shape[1:]), np.nan), values]))
+    _array(places, "Points", np.concatenate([e.position, e.ends.reshape(-1, 3)]))
     for name, these, size in (("Verts", np.arange(n), 1), ("Lines", n + np.arange(2 * count), 2)):
-        _array(parts[name], "connectivity", these.astype(np.int64))
-        _array(parts[name], "offsets", size * np.arange(1, len(these) // size + 1, dtype=np.int64))
+        part = ElementTree.SubElement(piece, name)
+        _array(part, "connectivity", these.astype(np.int64))
+        _array(part, "offsets", size * np.arange(1, len(these) // size + 1, dtype=np.int64))
     return root
 
 

@@ -13,21 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
-from .disks import ParticleTable
-from .exported import Exported, pick_numbers, slips_of
+from ..atomic_write import FORMAT, FORMAT_KEY, replace_whole
+from .disks import Disks, particles_of
+from .exported import Exported, read_back
 from .tables import block_of_frame, columns_of, lines_of, numbers_in
 
 PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
 NAMES_OF_TYPES = ("species", "type", "element")
 
 
-def read_xyz(path: Path, frame: int | None = None) -> ParticleTable:
+def read_xyz(path: Path, frame: int | None = None) -> Disks:
     """A frame of an extended XYZ file; the last one by default, if all are of as many disks."""
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 2, frame)
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
-    check_format(values.get(FORMAT_KEY), path)
     words = values.get("Properties", "").lower().split(":")
     if len(words) < 3:
         where = f"{path}, line {begin + 2}"
@@ -46,17 +45,18 @@ def read_xyz(path: Path, frame: int | None = None) -> ParticleTable:
     box = np.reshape(lattice, (3, 3)) if len(lattice) == 9 else None
     origin = numbers_in(values.get("Origin", "0 0 0"), path)
     sides = [each in ("T", "1", "True") for each in values.get("pbc", "T T T").split()]
-    slips = None if listed is None else slips_of(numbers_in(listed, path), "x_low" in columns)
-    given = pick_numbers(values)
-    return ParticleTable(str(path), columns, box, np.array(origin), sides, species, given=given, slips=slips)
+    more = read_back(path, values, None if listed is None else numbers_in(listed, path), "x_low" in columns)
+    return particles_of(path, columns, box, type_names=species, origin=np.array(origin), periodic=sides, **more)
 
 
 def write_xyz(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     """Write one frame or several, and return in words what of a Packing is there."""
+    says = ""
     with replace_whole(path) as new, new.open("w") as stream:
         for _, frame in frames:
             stream.write(_text(frame))
-    return "all of the packing is in it, to the bit"
+            says = "all of the packing is in it, to the bit" if frame.rows is not None else ""
+    return says
 
 
 def _text(frame: Exported) -> str:

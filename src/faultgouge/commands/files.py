@@ -12,7 +12,7 @@ from typer import Argument, Option
 
 from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
-from .packings import verdict_of
+from .packings import MaterialOf, verdict_of
 from .pictures import modes_of
 from .terminal import (
     RAMPED,
@@ -32,10 +32,9 @@ if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.analysis.files.formats import Disks
 
-OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON, YADE; what MDAnalysis reads."
+OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON; of YADE and MercuryDPM."
 OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
 OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
-OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
 OF_BALANCE = "Of a deck: force that may be out of balance, as a share of the mean contact force; 1e-4 by default."
 OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
 OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
@@ -56,7 +55,7 @@ def import_(
     contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
     frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
-    material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
+    material: MaterialOf = None,
     columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
@@ -126,6 +125,7 @@ def _spheres(
     from faultgouge.analysis.files.configuration_file import write_configuration
     from faultgouge.analysis.files.contact_tables import (
         material_of,
+        of_material,
         read_contacts,
         read_spheres,
         verdict_within_digits,
@@ -136,7 +136,7 @@ def _spheres(
         return
     law, says = material_of(material), list[str]()
     if contacts is None:
-        found = read_spheres(file, frame).of_material(law)
+        found = of_material(read_spheres(file, frame), law)
         says = [*found.remarks]
     elif is_measured(contacts):
         with working("draws of the forces"):
@@ -158,7 +158,6 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
     """Store disks of another code in balance, or brought to rest if that is wanted, and say what they are."""
     from faultgouge.analysis import BadInputError, PackingFileError, RunFile
     from faultgouge.analysis.files.formats import DATA, RESTART, format_of
-    from faultgouge.analysis.files.formats.disks import layer_remark
     from faultgouge.analysis.files.formats.tables import read_slips
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
     from faultgouge.pywrap.lammps.restart_file import read_disks
@@ -181,8 +180,8 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         reads = "read_restart" if format_of(file) is RESTART else "units lj, atom_style sphere and read_data"
         says = f"For spheres, or another law, write a deck with {reads} {file.name}, its laws, its walls and a run,"
         raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
-    for remark in filter(None, (disks.remark, layer_remark(disks, given.get("top"), packing.top))):
-        say(f"{file}: {remark}")
+    if disks.remark:
+        say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
@@ -234,7 +233,7 @@ def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
         wanted = Scene.from_toml(scene, packing={"radii": [smallest], "width": 20 * smallest}, command="settle")
         law, load = law_of(wanted, wanted.law.mus[0]), load_of(wanted)
     else:
-        with telling(disks.source, "describes no possible packing", (ValueError,)):
+        with telling(disks.source, "describes no possible packing", ValueError):
             law = law_of_parameters({"kt": 2 * values["kn"] / 7, "mu": 1.0} | values)
         inertia = values.get("inertia_factor", 1.0)
         load = {"fy": values["fy"], "drag_time": values.get("tau"), "inertia_factor": inertia}

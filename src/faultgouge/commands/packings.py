@@ -54,14 +54,13 @@ OF_ANY = "run.h5, NAME.disks, a LAMMPS deck; or, with --material, a table of sph
 AnyPacking = Annotated[Path, Argument(metavar="FILE", help=OF_ANY, callback=refuse_scene)]
 OF_TABLE = "Of a table: young, poisson, density, friction, restitution; or kn, kt and exponent (1.5 or 1) for young."
 MaterialOf = Annotated[str | None, Option("--material", metavar="KEY=VALUE,...", help=OF_TABLE)]
-OF_TIME = "How long motion is followed; until it has settled by default."
 
 
 @command("faultgouge examples pour && faultgouge stability pour.in --follow", as_json=True)
 def stability(
     file: Annotated[Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a deck (.in).")] = None,
     rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE, callback=one_of("fx"))] = None,
-    followed: Annotated[float | None, Option("--time", metavar="T", help=OF_TIME)] = None,
+    followed: Annotated[float | None, Option("--time", metavar="T", help="How long motion is followed.")] = None,
     follow: Follow = False,
     relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,
@@ -315,9 +314,9 @@ def vibrations(
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
-    from faultgouge.analysis.files.contact_tables import material_of, read_spheres
+    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_spheres
     from faultgouge.door import load
 
     if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
         raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
-    return load(file, frame) if material is None else read_spheres(file, frame).of_material(material_of(material))
+    return load(file, frame) if material is None else of_material(read_spheres(file, frame), material_of(material))

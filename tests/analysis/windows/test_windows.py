@@ -9,7 +9,7 @@ from families import DIGITS, OTHERS, crossing, embedded, normal_form
 
 from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.uncertain_digits import with_uncertainty
-from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing, full_operator
+from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing
 from faultgouge.analysis.windows.pair_over_load import Plane
 
 
@@ -23,7 +23,7 @@ def test_normal_form(d, points):
     assert window.eigenvalue == pytest.approx(1, abs=DIGITS)
     assert window.error < DIGITS
     # |y^H x| = (1 - (e/d)^2)^(1/2) in an orthonormal basis, at the closest of the points that were evaluated.
-    assert window.overlap < 1e-2
+    assert window.onset.overlap < 1e-2
 
 
 def test_window_behind_a_bend():
@@ -211,7 +211,7 @@ def test_contacts_without_force_are_left_out(reference_packing):
     assert len(touching.rattlers) == len(packing.rattlers) - 1
     assert touching.residual == packing.residual
     assert len(force_bearing(touching).contacts) == len(contacts)
-    assert abs(full_operator(touching) - full_operator(packing)).max() == 0
+    assert abs(System.of(touching).stiffness - System.of(packing).stiffness).max() == 0
     # Not so where the balance is bad because the packing is none.
     assert force_bearing(replace(touching, fx=1.0)).residual > 0.1
     assert len(force_bearing(replace(touching, fx=1.0)).contacts) >= len(contacts)

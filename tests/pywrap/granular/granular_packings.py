@@ -57,13 +57,32 @@ create_box {kinds} box
 """
 
 
+def deck(
+    places, law: str, wall: str = "", *, box: str = "block -4 4 -4 4 -2 8", boundary: str = "f f f", dimension: int = 3,
+    kinds=(), diameters=(1.0,), load: str = "0 0 -1", more: str = "fix move all nve/sphere", timestep: float = 1e-3,
+    run: str = "run 0",
+) -> str:  # fmt: skip
+    """Particles of density 1 at some places, with one law for pairs and for the plane of a wall, as a wall names it."""
+    granular, placed = law.startswith("granular "), zip(kinds or [1] * len(places), places, strict=True)
+    return "\n".join([
+        head(box, boundary, kinds=len(diameters), dimension=dimension),
+        *(f"create_atoms {k} single {x:.17g} {y:.17g} {z:.17g} units box" for k, (x, y, z) in placed),
+        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), "set group all density 1.0",
+        "pair_style granular" if granular else f"pair_style gran/{law}",
+        f"pair_coeff * * {law.removeprefix('granular ') if granular else ''}",
+        f"fix floor all wall/gran {law} {wall}" if wall else "",
+        f"fix load all gravity 1.0 vector {load}" if load else "",
+        f"timestep {timestep}", "thermo 1000000", "thermo_style custom step", "thermo_modify lost ignore", more, run,
+        "",
+    ])  # fmt: skip
+
+
 TWO = (
     head("block -4 4 -4 4 0 8")
     + """
 create_atoms 1 single 0 0 0.495 units box
 create_atoms 1 single 0 0.6 1.275 units box
-set group all diameter 1.0
-set group all density 1
+set group all diameter 1.0 density 1
 thermo_style custom step
 """
 )

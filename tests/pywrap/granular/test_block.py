@@ -3,32 +3,18 @@ sphere it slides down faster and faster."""
 
 import numpy as np
 import pytest
-from granular_packings import command, head, of_particle
+from granular_packings import command, deck, of_particle
 from pushes import PUSH
 
 from faultgouge.analysis import one_sided_motion, stability
 
 FRICTION = 0.5
 LAW = f"hooke 1e3 5 tangential linear_history 300 1.0 {FRICTION} damping velocity"
-BLOCK = (
-    head("block -2 2 -2 2 0 4", "p p f")
-    + f"""
-create_atoms 1 single 0 0 0.4995 units box
-set group all diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * {LAW}
-fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-variable pull equal mass(all)*v_slope
-fix pull all addforce v_pull 0 0
-fix drag all viscous 5.0
-fix move all nve/limit 0.1
-timestep 0.001
-thermo 1000000
-run 5000
-"""
-)
+BLOCK = deck(
+    [(0, 0, 0.4995)], f"granular {LAW}", "zplane 0 NULL contacts", boundary="p p f", run="run 5000",
+    more="variable pull equal mass(all)*v_slope\nfix pull all addforce v_pull 0 0\nfix drag all viscous 5.0\n"
+    "fix move all nve/limit 0.1",
+)  # fmt: skip
 """A sphere that does not turn."""
 
 
@@ -172,24 +158,10 @@ def test_velocities_that_are_left_out_are_named(block, speed):
 
 
 SPHERE = np.pi / 6
-UNEQUAL = (
-    head("block -2 2 -2 2 0 4", "p p f", kinds=2)
-    + f"""
-create_atoms 1 single -1 0 {0.5 - SPHERE / 1e3:.17g} units box
-create_atoms 2 single 1 0 {0.05 - 1e-3 * SPHERE / 1e3:.17g} units box
-set type 1 diameter 1.0
-set type 2 diameter 0.1
-set group all density 1.0
-pair_style granular
-pair_coeff * * {LAW}
-fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-4
-thermo 1000000
-run 0
-"""
-)
+UNEQUAL = deck(
+    [(-1, 0, 0.5 - SPHERE / 1e3), (1, 0, 0.05 - 1e-3 * SPHERE / 1e3)], f"granular {LAW}", "zplane 0 NULL contacts",
+    boundary="p p f", kinds=(1, 2), diameters=(1.0, 0.1),
+)  # fmt: skip
 """A sphere, and one of a thousandth of its mass."""
 
 
@@ -203,28 +175,20 @@ def test_the_mass_of_what_moves_decides_whether_its_velocity_is_named(lammps_wit
     assert any("particles move by up to 2e-05 " in each for each in from_lammps(lmp).remarks) is named
 
 
-HILL = (
-    head("block -3 6 -3 3 0 6", kinds=2)
-    + f"""
-create_atoms 1 single 0 0 0.5 units box
-create_atoms 2 single 0 0 1.4995 units box
-set group all diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * {LAW}
+PULLED = """
 group block type 2
 fix load block gravity 1.0 vector 0 0 -1
 variable pull equal mass(block)*v_slope*(1-exp(-0.5*step*dt))
 fix pull block addforce v_pull 0 0
 fix drag block viscous 10.0
 fix move block nve
-timestep 0.001
-thermo 1000000
 run 20000
 unfix pull
 fix pull block addforce $(mass(block)*v_slope) 0 0
 run 5000
 """
+HILL = deck(
+    [(0, 0, 0.5), (0, 0, 1.4995)], f"granular {LAW}", kinds=(1, 2), diameters=(1.0, 1.0), load="", more="", run=PULLED
 )
 """A sphere that does not turn, on top of another one, and pulled sideways until it nearly slides."""
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, command, head, instance
+from granular_packings import LAWS, command, deck, instance
 from scipy.spatial import cKDTree
 
 from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
@@ -45,19 +45,10 @@ def test_a_contact_at_the_bound_is_seen(lammps_with):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
     from faultgouge.pywrap import from_lammps
 
-    lmp = lammps_with(head("block -4 4 -4 4 -0.5 0.5", "f f p", dimension=2) + """
-create_atoms 1 single 0 0 0
-create_atoms 1 single 0.99 0 0
-create_atoms 1 single -0.99 0 0
-set group all diameter 1.0
-set group all density 1
-pair_style gran/hooke/history 1e4 4e3 0 0 0.5 1
-pair_coeff * *
-group first id 1
-group held id 3
-fix move all nve/sphere
-timestep 1e-3
-""")  # fmt: skip
+    lmp = lammps_with(deck(
+        [(0, 0, 0), (0.99, 0, 0), (-0.99, 0, 0)], "hooke/history 1e4 4e3 0 0 0.5 1", box="block -4 4 -4 4 -0.5 0.5",
+        boundary="f f p", dimension=2, load="", run="",
+    ))  # fmt: skip
     # particle 2 slides past the first, which then is at the bound with it, and nothing with the third
     lmp.numpy.extract_atom("v")[1, 1] = 100.0
     command(lmp, "unfix move\nfix slow all nve/noforce")
@@ -74,30 +65,21 @@ timestep 1e-3
     assert apart(stiffness_matrix(found), mean) < 1e-6
 
 
-ROW = (
-    head("block -4 4 -4 4 0 4")
-    + """
-create_atoms 1 single -1.5 0 0.4999 units box
-create_atoms 1 single 0.0 0 0.4999 units box
-create_atoms 1 single {x} 0 0.4999 units box
-set group all diameter 1.0 density 1.0
-pair_style gran/hooke/history 1e4 3e3 20 NULL 0.0 1
-pair_coeff * *
-fix floor all wall/gran hooke/history 1e4 3e3 20 NULL 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-3
-run 0
-"""
-)
+SLIDES = "hooke/history 1e4 3e3 20 NULL 0.5 1 zplane 0 NULL contacts"
+
+
+def row(*places, more: str = "fix move all nve/sphere") -> str:
+    """Spheres without friction on a plane with friction."""
+    law = "hooke/history 1e4 3e3 20 NULL 0.0 1"
+    return deck([(*each, 0.4999) for each in places], law, more=f"fix floor all wall/gran {SLIDES}\n{more}")
 
 
 def test_dashpots_of_frozen_particles(lammps_with):
     """They weigh infinitely much in LAMMPS's dashpots, whichever way C is found."""
     from faultgouge.pywrap import from_lammps
 
-    frozen = ROW.format(x="1.0").replace("-1.5 0 0.4999", "-0.99 0.1 0.4999").replace("1.0 0 0.4999", "0.99 0.1 0.4999")
-    lmp = lammps_with(frozen.replace("run 0", "group base id 1\nfix base base freeze\nrun 0"))
+    frozen = "group base id 1\nfix base base freeze\nfix move all nve/sphere"
+    lmp = lammps_with(row((-0.99, 0.1), (0, 0), (0.99, 0.1), more=frozen))
     laws, found = (from_lammps(lmp, differences=each, balance=np.inf, prove=False) for each in (False, True))
     assert apart(damping_matrix(found), damping_matrix(laws)) < 1e-6
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-5
@@ -111,7 +93,7 @@ def test_particles_that_nearly_touch(lammps_with, gap):
     """
     from faultgouge.pywrap import from_lammps
 
-    lmp = lammps_with(ROW.format(x=f"{1 + gap:.17g}"))
+    lmp = lammps_with(row((-1.5, 0), (0, 0), (1 + gap, 0)))
     found = from_lammps(lmp, differences=True, balance=np.inf)
     laws = from_lammps(lmp, prove=False, balance=np.inf)
     assert len(found.contacts) == 0
@@ -131,44 +113,22 @@ def test_a_weak_contact_among_strong_ones(lammps_with, overlap):
     from faultgouge.pywrap import from_lammps
 
     places = (0.0, 0.99, 1.98, 2.98 - overlap)
-    lmp = lammps_with("""
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 -4 4 units box
-create_box 1 box
-""" + "\n".join(f"create_atoms 1 single {x:.17g} 0 0 units box" for x in places) + """
-set group all diameter 1.0 density 1.0
-pair_style gran/hooke/history 1e4 3e3 20 NULL 0.5 1
-pair_coeff * *
-fix move all nve/sphere
-timestep 1e-3
-run 0
-""")  # fmt: skip
+    chain = deck(
+        [(x, 0, 0) for x in places], "hooke/history 1e4 3e3 20 NULL 0.5 1", box="block -4 4 -4 4 -4 4", load=""
+    )
+    lmp = lammps_with(chain)
     found, laws = (from_lammps(lmp, differences=each, prove=False, balance=np.inf) for each in (True, False))
     assert not len(found.one_sided_particles)
     assert found.operator_error < 1e-5
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-6
 
 
-BOX = (
-    head("block -10 10 -10 10 -10 10")
-    + """
-{spheres}
-set group all diameter 1 density 1
-pair_style gran/hooke/history 4e3 NULL 100 NULL 0.5 1
-pair_coeff * *
-region inner block -6 6 -6 6 -6 6 units box
-fix inner all wall/gran/region hooke/history 4e3 NULL 100 NULL 0.5 1 region inner
-fix move all nve/sphere
-fix load all gravity 1 vector {down}
-fix drag all viscous 1
-timestep 0.004
-run 20000
-"""
-)
+def in_a_box(*places, down: str) -> str:
+    """Spheres in a region."""
+    law = "hooke/history 4e3 NULL 100 NULL 0.5 1"
+    region = "region inner block -6 6 -6 6 -6 6 units box\nfix inner all wall/gran/region {law} region inner"
+    more = f"{region.format(law=law)}\nfix move all nve/sphere\nfix drag all viscous 1"
+    return deck(places, law, box="block -10 10 -10 10 -10 10", load=down, more=more, timestep=0.004, run="run 20000")
 
 
 @pytest.mark.parametrize("kisses", [False, True])
@@ -176,9 +136,8 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
     """With friction at two and three faces; or at a face that bears nothing, which is about to open."""
     from faultgouge.pywrap import from_lammps
 
-    spheres = "create_atoms 1 single -5.5 -5.5 -5.5"
-    spheres += "" if kisses else "\ncreate_atoms 1 single -4.5 -5.5 -5.5"
-    lmp = lammps_with(BOX.format(spheres=spheres, down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
+    places = [(-5.5, -5.5, -5.5), (-4.5, -5.5, -5.5)]
+    lmp = lammps_with(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
     found = from_lammps(lmp)
     verdict = stability(found)
     if kisses:  # nothing presses the sphere along x
@@ -194,8 +153,8 @@ def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
     """Two spheres rest on the floor of a region and hardly press each other: their weight is what is in balance."""
     from faultgouge.pywrap import from_lammps
 
-    spheres = "create_atoms 1 single 0 0 -5.5\ncreate_atoms 1 single 0.999 0 -5.5"
-    found = from_lammps(lammps_with(BOX.format(spheres=spheres, down="0 0 -1")), balance=1.0)
+    spheres = in_a_box((0, 0, -5.5), (0.999, 0, -5.5), down="0 0 -1")
+    found = from_lammps(lammps_with(spheres), balance=1.0)
     weight = np.pi / 6
     assert found.wall_force == pytest.approx(weight, rel=1e-3)
     contacts = derive_frozen(found.contacts, normal_force=np.full(len(found.contacts), 1e-6 * weight))
@@ -211,39 +170,16 @@ def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
     assert f"{residual}, the largest force of a contact or a wall 0.524" in said(1e-2).reasons
 
 
-COLUMN = """
-units si
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -3 3 -3 3 -1 8 units box
-create_box 1 box
-create_atoms 1 single 0 0 0.49 units box
-create_atoms 1 single 0 0 1.45 units box
-create_atoms 1 single 0 0 2.41 units box
-create_atoms 1 single 0 0 3.37 units box
-set group all diameter 1.0 density 1
-pair_style granular
-pair_coeff * * {model}
-region die block -3 3 -3 3 0 3.86 units box
-fix die all wall/gran/region granular {model} region die
-fix move all nve
-fix hold all setforce 0.0 0.0 NULL
-fix drag all viscous 5
-timestep 1e-3
-thermo 100000
-run 20000
-"""
-
-
 @pytest.mark.long
 def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
     """In a die the model mdr has a particle's volume resist: its neighbours feel one another through it."""
     from faultgouge.pywrap import from_lammps
 
-    model = "mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
-    found = from_lammps(lammps_with(COLUMN.format(model=model)))
+    model = "granular mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
+    die = f"region die block -3 3 -3 3 0 3.86 units box\nfix die all wall/gran/region {model} region die\n"
+    die += "fix move all nve\nfix hold all setforce 0.0 0.0 NULL\nfix drag all viscous 5"
+    places = [(0, 0, 0.49 + 0.96 * k) for k in range(4)]
+    found = from_lammps(lammps_with(deck(places, model, load="", more=die, run="run 20000")))
     assert found.operator_error < 1e-5
     assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in long steps, 3e-5 in short ones
     along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
@@ -256,7 +192,7 @@ def test_particles_far_apart_that_something_couples(lammps_with):
     """They are displaced together, as no neighbours are; the refusal names the one that feels the other most."""
     from faultgouge.pywrap import NotTakenError, from_lammps
 
-    lmp = lammps_with(ROW.format(x="2.5"))
+    lmp = lammps_with(row((-1.5, 0), (0, 0), (2.5, 0)))
     command(lmp, "group left id 1\ngroup right id 3\nfix tie left spring couple right 3e3 4 0 0 0")
     with pytest.raises(NotTakenError, match=r"at particle [13] at \(.*, 0, 0\.4999\).*couples particles that are no"):
         from_lammps(lmp, differences=True, balance=np.inf)

@@ -2,33 +2,18 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, head, of_particle
+from granular_packings import command, deck, of_particle
 
 from faultgouge.analysis import one_sided_motion, stability
 from faultgouge.analysis.operators.gaps import gaps_of
 
 GAP = 1e-6
 LAW = "hooke 1e3 5 tangential linear_history 300 1.0 0.5 damping velocity"
-ROW = (
-    head(f"prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0", "p f p", dimension=2)
-    + f"""
-create_atoms 1 single -0.5 0.4995 0 units box
-create_atoms 1 single {0.5 + GAP:.17g} 0.4995 0 units box
-create_atoms 1 single {1.5 + 2.5 * GAP:.17g} 0.4995 0 units box
-set group all diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * {LAW}
-fix floor all wall/gran granular {LAW} yplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 -1 0
-fix drag all viscous 3.0
-fix move all nve
-timestep 0.001
-thermo 1000000
-run 5000
-unfix drag
-"""
-)
+ROW = deck(
+    [(-0.5, 0.4995, 0), (0.5 + GAP, 0.4995, 0), (1.5 + 2.5 * GAP, 0.4995, 0)], f"granular {LAW}",
+    "yplane 0 NULL contacts", box=f"prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0", boundary="p f p", dimension=2,
+    load="0 -1 0", more="fix drag all viscous 3.0\nfix move all nve", run="run 5000\nunfix drag",
+)  # fmt: skip
 """Three disks that do not turn, side by side, the last beside the first: gaps of 1, 1.5 and 0.5."""
 
 

@@ -2,56 +2,49 @@
 
 import numpy as np
 import pytest
-from granular_packings import command
+from granular_packings import command, deck
 from pushes import in_steps, pushed
 
 from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.pushes import random_pushes
 
-CELL = """
-units lj
-atom_style sphere
-atom_modify map array
-boundary p p f
-newton off
-comm_modify vel yes
-region box block 0 3.3 0 3.3 -1 12 units box
-create_box 2 box
-{spheres}
-set group all diameter 1.0
-set group all density 1.0
-group lid type 2
-group filling type 1
-neigh_modify exclude group lid lid
-pair_style gran/hertz/history 1e4 3e3 20 10 0.5 1
-pair_coeff * *
-fix floor all wall/gran hertz/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move filling nve/sphere
-{lid}
-fix drag all viscous 1.0
-timestep 0.001
-thermo 100000
-run 20000
-"""
-
+LAW = "hertz/history 1e4 3e3 20 10 0.5 1"
 PLACES = np.array([(x, y, z) for z in range(4) for y in range(3) for x in range(3)]) * 1.1 + 0.55
 PLACES[:27, :2] += np.random.default_rng(3).uniform(-0.04, 0.04, (27, 2))
-SPHERES = "\n".join(f"create_atoms {1 + (k >= 27)} single {x} {y} {z} units box" for k, (x, y, z) in enumerate(PLACES))
 
 
 @pytest.fixture
 def cell(lammps_with):
     """Makes a LAMMPS with 27 spheres under a lid of nine."""
 
-    def make(lid: str, **changes: str):
-        text = CELL.format(lid=lid, spheres=SPHERES)
-        for before, after in changes.items():
-            text = text.replace(before, after)
-        return lammps_with(text)
+    def make(lid: str, *, law: str = LAW, wall: str = "zplane 0 NULL contacts", run: str = "run 20000"):
+        groups = "group lid type 2\ngroup filling type 1\nneigh_modify exclude group lid lid"
+        more = f"{groups}\nfix move filling nve/sphere\n{lid}\nfix drag all viscous 1.0"
+        return lammps_with(deck(
+            PLACES, law, wall, box="block 0 3.3 0 3.3 -1 12", boundary="p p f", kinds=[1] * 27 + [2] * 9,
+            diameters=(1.0, 1.0), more=more, run=run,
+        ))  # fmt: skip
 
     return make
+
+
+def agree(found, measured, *names) -> None:
+    """K, C and P of laws are those of differences: 6e-9 of K and 9e-12 of C were measured."""
+    laws = {"stiffness": stiffness_matrix(found), "damping": damping_matrix(found), "constraint": found.constraint}
+    for name in names:
+        other = getattr(measured, name)
+        assert abs(laws[name] - other).max() < 1e-6 * abs(other).max()
+
+
+def moves_alike(lmp, found) -> None:
+    """LAMMPS moves as K and C say, extrapolated to a step of zero: dashpots feel the velocity of half steps."""
+    from faultgouge.pywrap import compare_motion
+
+    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
 
 
 CONFINED = "fix push lid addforce 0.05 0 -2.0"
@@ -73,7 +66,7 @@ OFTEN = ("aveforce, sideways held", "rigid, pushed by a later fix")
 )
 def test_a_lid_moves_as_one(cell, tmp_path, lid):
     from faultgouge import relax
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import from_lammps
 
     lmp = cell(LIDS[lid])
     assert relax(lmp) < 1e-8
@@ -84,12 +77,7 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
     assert found.operators == "laws"
     assert found.proof < 1e-5
     measured = from_lammps(lmp, differences=True)
-    for matrix, other in (
-        (stiffness_matrix(found), measured.stiffness),
-        (damping_matrix(found), measured.damping),
-        (found.constraint, measured.constraint),
-    ):
-        assert abs(matrix - other).max() < 1e-6 * abs(other).max()  # 6e-9 of K, 9e-12 of C
+    agree(found, measured, "stiffness", "damping", "constraint")
     assert found.residual == pytest.approx(measured.residual, rel=1e-3)
     free = "xz" if "held" in lid else "xyz"
     n, mass = len(found), found.coordinate_mass
@@ -102,39 +90,11 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
     translation, rotation = found.vectors(np.eye(len(mass))["xyz".index(free[-1]) * n + leader])
     assert np.ptp(translation[on_lid], axis=0).max() == 0 == np.abs(rotation).max()
     assert np.count_nonzero(translation) == count
-    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
-    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
-    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
-    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    moves_alike(lmp, found)
     write_configuration(tmp_path / "cell.h5", found)
     assert read_configuration(tmp_path / "cell.h5") == found
 
 
-TWO_LIDS = """
-units lj
-atom_style sphere
-boundary p p f
-newton off
-comm_modify vel yes
-region box block 0 2 0 2 -1 4 units box
-create_box 1 box
-{spheres}
-group low id 1 2 3 4
-group grain id 5
-group lid id 6 7 8 9
-group bed union low lid
-set group all diameter 1.0 density 1.9
-set group lid density 2.5
-pair_style gran/hertz/history 1e4 NULL 100 NULL 0.5 1
-pair_coeff * *
-{lids}
-fix load lid addforce 0 0 -1.0
-fix move grain nve/sphere
-fix drag grain viscous 1
-thermo_style custom step
-timestep 0.001
-run 40000
-"""
 CORNERS = [(x, y) for x in (0, 1) for y in (0, 1)]
 
 
@@ -144,11 +104,18 @@ def test_a_grain_between_two_bodies_of_one_fix(lammps_with):
     from faultgouge.pywrap import compare_motion, from_lammps
 
     places = [(x, y, 0.0) for x, y in CORNERS] + [(0.5, 0.45, 0.7)] + [(x, y, 1.4) for x, y in CORNERS]
-    spheres = "\n".join(f"create_atoms 1 single {x} {y} {z} units box" for x, y, z in places)
-    rigid = "fix lids {} rigid group 2 low lid force 1 off off off torque * off off off force 2 on off on"
+    groups = "group low id 1 2 3 4\ngroup grain id 5\ngroup lid id 6 7 8 9\ngroup bed union low lid\n"
+    groups += (
+        "set group all density 1.9\nset group lid density 2.5\nfix move grain nve/sphere\nfix drag grain viscous 1"
+    )
+    rigid = "rigid group 2 low lid force 1 off off off torque * off off off force 2 on off on"
     found = {}
     for group in ("all", "bed"):
-        lmp = lammps_with(TWO_LIDS.format(spheres=spheres, lids=rigid.format(group)), log=f"log.{group}")
+        lids = f"{groups}\nfix lids {group} {rigid}\nfix load lid addforce 0 0 -1.0"
+        lmp = lammps_with(deck(
+            places, "hertz/history 1e4 NULL 100 NULL 0.5 1", box="block 0 2 0 2 -1 4", boundary="p p f", load="",
+            more=lids, run="run 40000",
+        ), log=f"log.{group}")  # fmt: skip
         found[group] = from_lammps(lmp)
     assert found["all"] == found["bed"]
     here = found["bed"]
@@ -161,8 +128,7 @@ def test_a_grain_between_two_bodies_of_one_fix(lammps_with):
     assert c.normal_dashpot == pytest.approx(100 * reduced * np.sqrt(0.25 * c.overlap), rel=1e-9)
     measured = from_lammps(lmp, differences=True)
     assert measured.remarks[0].startswith("K and C are differences of LAMMPS's forces: ")
-    for matrix, other in ((stiffness_matrix(here), measured.stiffness), (damping_matrix(here), measured.damping)):
-        assert abs(matrix - other).max() < 1e-6 * abs(other).max()
+    agree(here, measured, "stiffness", "damping")
     told, run = stability(here), compare_motion(lmp, here, 2.0, 1e-6, timestep=1e-5)
     assert told.stable is True
     assert run.difference < 1e-3
@@ -178,7 +144,7 @@ def test_a_rigid_lid_with_contacts_at_the_bound_rests_as_in_lammps(cell):
     from faultgouge.pywrap import from_lammps
 
     lid = "fix push lid addforce 0.5 0 -2.0\nfix body lid rigid single torque 1 off off off"
-    lmp = cell(lid, **{"10 0.5 1": "10 0.3 1"})
+    lmp = cell(lid, law=LAW.replace("10 0.5 1", "10 0.3 1"))
     relax(lmp)
     lmp.command("run 50000 post no")
     found = from_lammps(lmp)
@@ -241,15 +207,13 @@ def test_a_lid_of_two_masses(cell, lid):
     """fix aveforce gives its particles the same force: the lid deforms as the inverse masses. A body of fix rigid does
     not, and dashpots feel its mass."""
     from faultgouge import relax
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import from_lammps
 
     lmp = cell("set atom 30*32 density 2.0\n" + LIDS[lid])
     relax(lmp)
     found = from_lammps(lmp)
     assert len(set(found.mass[found.kind == 2].round(10))) == 2
-    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
-    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
-    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    moves_alike(lmp, found)
 
 
 def test_a_lid_out_of_balance_is_named(cell):
@@ -285,7 +249,7 @@ def test_a_spring_in_aveforce_is_refused(cell):
 def test_a_body_that_may_rotate_is_refused(cell, words, says):
     from faultgouge.pywrap import NotTakenError, from_lammps
 
-    lmp = cell(f"{CONFINED}\nfix body lid rigid {words}", **{"run 20000": "run 10"})
+    lmp = cell(f"{CONFINED}\nfix body lid rigid {words}", run="run 10")
     with pytest.raises(NotTakenError, match=says):
         from_lammps(lmp)
 
@@ -295,7 +259,7 @@ def test_a_spring_of_each_sphere_is_in_the_operator(cell):
     from faultgouge import relax
     from faultgouge.pywrap import from_lammps
 
-    lmp = cell("fix lid lid nve/sphere", **{" contacts": ""})
+    lmp = cell("fix lid lid nve/sphere", wall="zplane 0 NULL")
     relax(lmp)
     laws = from_lammps(lmp)
     assert laws.operators == "laws"
@@ -313,7 +277,7 @@ def test_a_spring_of_a_lid_is_in_the_operator(cell):
     """fix spring pulls at the centre of mass of spheres that move as one: its constant is in one entry of K, and LAMMPS
     moves so."""
     from faultgouge import relax
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import from_lammps
 
     lid = f"fix body lid nve\n{CONFINED}\nfix pull lid spring tether 700.0 1.7 NULL NULL 0.0"
     lmp = cell(f"{lid}\nfix stiff lid aveforce 0.0 0.0 0.0")
@@ -322,9 +286,7 @@ def test_a_spring_of_a_lid_is_in_the_operator(cell):
     assert found.operators == "differences"
     assert found.operator_error < 1e-5
     assert found.proof < 1e-5
-    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
-    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
-    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    moves_alike(lmp, found)
     command(lmp, "unfix pull")
     without = from_lammps(lmp, differences=True, balance=np.inf)
     added, leader = found.stiffness - without.stiffness, int(np.flatnonzero(found.kind == 2)[0])

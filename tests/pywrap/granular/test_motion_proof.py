@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, instance, start, with_law
+from granular_packings import command, deck, instance, start, with_law
 
 TRAPS = """
 variable trap atom -0.2*(x-1.5)
@@ -163,7 +163,7 @@ def test_proof_is_kept(sliding, tmp_path):
     from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
     from faultgouge.pywrap import from_lammps
 
-    found, other = from_lammps(sliding), from_lammps(sliding, prove=False)
+    found, other = from_lammps(sliding, [f"pair_style {STYLE}", *REST[:3]]), from_lammps(sliding, prove=False)
     assert found.contacts.at_bound.any()
     assert found.proof < 1e-5
     assert f"proof {found.proof:.1g}>" in repr(found)
@@ -176,61 +176,45 @@ def test_proof_is_kept(sliding, tmp_path):
         (tmp_path / "run.h5").unlink()
 
 
-@pytest.mark.long
-def test_commands_of_another_run(sliding):
-    """The same normal forces, but other tangential stiffnesses, dashpots or friction."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    style = HERTZ.replace("0.5", "0.3")
-    rest = ["pair_coeff * *", "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
-            "fix move all nve/sphere"]  # fmt: skip
-    assert from_lammps(sliding, [f"pair_style {style}", *rest]) == from_lammps(sliding)
-    for before, after in (("NULL", "1e3"), ("40 40", "20 40"), ("40 40", "40 10"), ("40 0.3", "40 0.9")):
-        with pytest.raises(NotTakenError, match=r"as K says: .*the commands are those of another run or instance"):
-            from_lammps(sliding, [f"pair_style {style.replace(before, after)}", *rest])
-    with pytest.raises(NotTakenError, match=r"contacts carry more than Coulomb's bound .* with mu = 0.1"):
-        from_lammps(sliding, [f"pair_style {style.replace('40 0.3', '40 0.1')}", *rest])
+STYLE = HERTZ.replace("0.5", "0.3")
+REST = ["pair_coeff * *", "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
+        "fix move all nve/sphere", "fix one all addforce 0 0 0", "fix two all addforce 0 0 0"]  # fmt: skip
+OTHER = r"as K says: .*the commands are those of another run or instance"
+RUNS = [
+    (("NULL", "1e3"), OTHER),
+    *(pytest.param(each, OTHER, marks=pytest.mark.long) for each in (("40 40", "20 40"), ("40 40", "40 10"))),
+    pytest.param(("40 0.3", "40 0.9"), OTHER, marks=pytest.mark.long),
+    (("40 0.3", "40 0.1"), r"contacts carry more than Coulomb's bound .* with mu = 0.1"),
+]
 
 
-def test_a_fix_is_not_accused_without_which_the_motion_is_no_other(sliding):
-    """The commands have another law, and two fixes add constant forces."""
+@pytest.mark.parametrize(("change", "says"), RUNS)
+def test_commands_of_another_run(sliding, change, says):
+    """The same normal forces, but other tangential stiffnesses, dashpots or friction; and two constant forces, which
+    are not accused."""
     from faultgouge.pywrap import NotTakenError, from_lammps
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 
-    style = HERTZ.replace("0.5", "0.3").replace("NULL", "1e3")
-    commands = [f"pair_style {style}", "pair_coeff * *", "fix move all nve/sphere",
-                "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
-                "fix one all addforce 0 0 0", "fix two all addforce 0 0 0"]  # fmt: skip
-
     def work():
-        command(sliding, "fix one all addforce 0 0 0\nfix two all addforce 0 0 0")
-        return from_lammps(sliding, commands)
+        command(sliding, "\n".join(REST[3:]))
+        return from_lammps(sliding, [f"pair_style {STYLE.replace(*change)}", *REST])
 
-    with pytest.raises(NotTakenError, match=r"as K says: .*the commands are those of another run") as refusal:
+    with pytest.raises(NotTakenError, match=says) as refusal:
         in_a_copy(work)
     assert "addforce" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    "around",
-    [
-        pytest.param(("echo none", "echo both"), id="echo none"),
-        pytest.param(("log none", 'log "{log}" append'), id="log none"),
-    ],
-)
-def test_logs_that_lack_commands(tmp_path, around):
+def test_a_log_that_lacks_commands(tmp_path):
     from faultgouge.pywrap import NotTakenError, from_lammps
 
-    log = tmp_path / "log.lammps"
-    lmp = instance(log)
+    lmp = instance(tmp_path / "log.lammps")
     start(lmp, 3, 20)
-    before, after = (each.format(log=log) for each in around)
     command(lmp, f"""
 pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1
 pair_coeff * *
-{before}
+echo none
 pair_style {HERTZ}
-{after}
+echo both
 fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
 fix load all gravity 1.0 vector 0.1 0 -1
 fix move all nve/sphere
@@ -243,40 +227,24 @@ run 60000
     lmp.close()
 
 
-def test_bonds(tmp_path):
+def test_bonds(lammps_with):
     """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
     from faultgouge.analysis import stiffness_matrix
     from faultgouge.pywrap import from_lammps
 
-    lmp = instance(tmp_path / "log.lammps")
-    command(lmp, f"""
-units lj
-atom_style hybrid sphere bond
-atom_modify map array
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 8 units box
-create_box 1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4
-create_atoms 1 single 0 0 0.5 units box
-create_atoms 1 single 0.99 0 0.5 units box
-create_atoms 1 single 0.5 0.86 0.5 units box
-create_atoms 1 single 0.5 0.29 1.3 units box
-set group all diameter 1.0 density 1.0
-pair_style {HERTZ}
-pair_coeff * *
+    bonded = """fix move all nve/sphere
+fix drag all viscous 1.5
 bond_style harmonic
 bond_coeff 1 50.0 0.99
 special_bonds lj/coul 1.0 1.0 1.0
-fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
 run 0
 create_bonds single/bond 1 1 2
-run 60000
-""")  # fmt: skip
+run 60000"""
+    places = [(0, 0, 0.5), (0.99, 0, 0.5), (0.5, 0.86, 0.5), (0.5, 0.29, 1.3)]
+    spheres = deck(places, HERTZ[5:], "zplane 0 NULL contacts", timestep=0.002, more=bonded)
+    spheres = spheres.replace("atom_style sphere", "atom_style hybrid sphere bond\natom_modify map array")
+    more = "1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4"
+    lmp = lammps_with(spheres.replace("create_box 1 box", f"create_box {more}"))
     found = from_lammps(lmp)
     assert found.operators == "differences"
     assert found.proof < 1e-5
@@ -292,4 +260,3 @@ run 60000
     first, second = len(found) * np.arange(3), len(found) * np.arange(3) + 1
     for rows, columns, sign in ((first, first, 1), (first, second, -1), (second, second, 1)):
         assert added[np.ix_(rows, columns)] == pytest.approx(sign * expected, abs=1e-2)
-    lmp.close()

@@ -44,7 +44,7 @@ run 1950
     assert one == other
 
 
-@pytest.mark.parametrize("style", ["custom/gz", "atom/gz", "xyz/gz"])
+@pytest.mark.parametrize("style", ["custom/gz", "xyz/gz"])
 def test_a_look_leaves_compressed_dumps_whole(tmp_path, style):
     """zlib writes the rest of a file when it is closed, as a copy of the process would at the place that both share."""
     from faultgouge.pywrap import from_lammps

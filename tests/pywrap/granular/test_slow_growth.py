@@ -2,54 +2,14 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, head, of_particle
+from granular_packings import command, deck, of_particle
 
 from faultgouge.analysis import spectrum, stability
 from faultgouge.analysis.motion import linear
 
 SPRING, HALF_SPAN = 1e3, 0.95
 MASS = np.pi / 6
-ARCH = (
-    head("block -4 4 -4 4 -0.5 0.5", "f f p", kinds=2, dimension=2)
-    + """
-create_atoms 1 single -{span} 0 0 units box
-create_atoms 1 single {span} 0 0 units box
-create_atoms 2 single 0 {height} 0 units box
-set group all diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * hooke {spring} {dashpot} tangential linear_history 300 1.0 0.0 damping velocity
-group middle type 2
-fix load middle gravity {gravity:.17g} vector 0 -1 0
-fix move middle nve/sphere
-timestep {step}
-thermo 1000000
-run 0
-"""
-)
 LINEAR = "hooke 500 1 tangential linear_history 200 1.0 0.5 damping velocity"
-STACK = (
-    head("block -4 4 -4 4 0 8", kinds=3)
-    + """
-create_atoms 1 single 0 0 0.5 units box
-create_atoms 2 single 0 0 {top:.17g} units box
-create_atoms 3 single 2 0 {low:.17g} units box
-set type 1*2 diameter 1.0
-set type 3 diameter 0.1
-set group all density 1.0
-pair_style granular
-pair_coeff * * {law}
-fix floor all wall/gran granular {law} zplane 0 NULL contacts
-group small type 3
-group moving type 2 3
-fix load moving gravity 1.0 vector 0 0 -1
-fix move moving nve/sphere
-fix rolls small addforce {residual} 0 0
-timestep 5e-4
-thermo 1000000
-run 0
-"""
-)
 
 
 @pytest.mark.parametrize(
@@ -65,13 +25,14 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
     stiffness = 2 * SPRING * (1 / length**3 * height**2 + 1 - 1 / length)  # -d F_y / dy
     damping = 2 * dashpot * (height / length) ** 2
     expected = max(np.roots([MASS, damping, stiffness]).real)
-    step = 0.2 * MASS / damping
-    lmp = lammps_with(
-        ARCH.format(
-            span=HALF_SPAN, height=height, spring=SPRING, dashpot=dashpot, step=step,
-            gravity=2 * force * height / length / MASS,
-        )
+    arch = deck(
+        [(-HALF_SPAN, 0, 0), (HALF_SPAN, 0, 0), (0, height, 0)],
+        f"granular hooke {SPRING} {dashpot} tangential linear_history 300 1.0 0.0 damping velocity",
+        box="block -4 4 -4 4 -0.5 0.5", boundary="f f p", dimension=2, kinds=(1, 1, 2), diameters=(1.0, 1.0), load="",
+        more=f"group middle type 2\nfix move middle nve/sphere\nfix load middle gravity "
+        f"{2 * force * height / length / MASS:.17g} vector 0 -1 0", timestep=0.2 * MASS / damping,
     )  # fmt: skip
+    lmp = lammps_with(arch)
     from faultgouge.pywrap import from_lammps
 
     if large:  # as if not all eigenvalues were known
@@ -88,8 +49,15 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
 def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
     """A sphere on top of another one rolls down. Beside them a sphere of a tenth of their size feels a force that is
     left, 0.9e-4 of the mean contact force, which would be an eigenvalue of 1 of its own."""
-    small = MASS * 1e-3
-    lmp = lammps_with(STACK.format(law=LINEAR, top=1.5 - MASS / 500, low=0.05 - small / 500, residual=2.3e-5))
+    rolls = (
+        "group small type 3\ngroup moving type 2 3\nfix rolls small addforce 2.3e-5 0 0\nfix move moving nve/sphere\n"
+    )
+    stack = deck(
+        [(0, 0, 0.5), (0, 0, 1.5 - MASS / 500), (2, 0, 0.05 - 1e-3 * MASS / 500)], f"granular {LINEAR}",
+        "zplane 0 NULL contacts", kinds=(1, 2, 3), diameters=(1.0, 1.0, 0.1), load="", timestep=5e-4,
+        more=f"{rolls}fix load moving gravity 1.0 vector 0 0 -1",
+    )  # fmt: skip
+    lmp = lammps_with(stack)
     from faultgouge.pywrap import from_lammps
 
     here = from_lammps(lmp)
@@ -104,31 +72,15 @@ def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
     assert 2 * np.log(places[1] / places[0]) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
 
 
-APART = (
-    head("block -4 4 -4 4 0 8", kinds=2)
-    + """
-create_atoms 1 single 0 0 {height:.17g} units box
-create_atoms 2 single 2 0 {height:.17g} units box
-set group all diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * {law}
-group bounces type 1
-group lossy type 2
-fix spring bounces wall/gran granular hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL
-fix dashpot lossy wall/gran granular {law} zplane 0 NULL
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-3
-thermo 1000000
-run 0
-"""
-)
+BOUNCES = "hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL"
 
 
 def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
     """Its Re s is zero but for rounding, of either sign."""
-    lmp = lammps_with(APART.format(law=LINEAR, height=0.5 - MASS / 500))
+    walls = f"group bounces type 1\ngroup lossy type 2\nfix spring bounces wall/gran granular {BOUNCES}\n"
+    walls += f"fix dashpot lossy wall/gran granular {LINEAR} zplane 0 NULL\nfix move all nve/sphere"
+    places = [(0, 0, 0.5 - MASS / 500), (2, 0, 0.5 - MASS / 500)]
+    lmp = lammps_with(deck(places, f"granular {LINEAR}", kinds=(1, 2), diameters=(1.0, 1.0), more=walls))
     from faultgouge.pywrap import from_lammps
 
     here = from_lammps(lmp)

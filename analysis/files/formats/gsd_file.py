@@ -1,14 +1,12 @@
-"""Files that other libraries read: GSD, HOOMD's format, in and out; and what MDAnalysis reads with radii, such as PQR.
+"""GSD, HOOMD's format, in and out.
 
 GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export also has these
 numbers in float64, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other
-readers see float32. The y axis of a GSD box has its middle at zero; an export gives the height of the floor. MDAnalysis
-hands out positions in float32.
+readers see float32. The y axis of a GSD box has its middle at zero; an export gives the height of the floor.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
@@ -17,15 +15,14 @@ from typing import Any
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, open_plain, replace_whole
-from .disks import ParticleTable, choose_frame
-from .exported import Exported, pick_numbers, slips_of
+from ..atomic_write import FORMAT, FORMAT_KEY, open_plain, replace_whole
+from .disks import Disks, choose_frame, particles_of
+from .exported import Exported, read_back
 
 OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
 OWN_QUANTITIES = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
-SINGLE_PRECISION = "in float32, about 1e-7 of a coordinate: overlaps are lost below that"
-GSD_PRECISION = f"GSD keeps positions and radii {SINGLE_PRECISION}"
+GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
 
 
 def _hoomd(path: Path) -> Any:
@@ -36,7 +33,7 @@ def _hoomd(path: Path) -> Any:
         raise PackingFileError(f"{path} {needs}.") from None
 
 
-def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
+def read_gsd(path: Path, frame: int | None = None) -> Disks:
     """A frame of a GSD file; the last one by default, if all are of as many disks."""
     hoomd = _hoomd(path)
     open_plain(path).close()
@@ -46,17 +43,13 @@ def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
     log, particles, box = shown.log, shown.particles, shown.configuration.box
     columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
     columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
-    names = list(particles.types or [])
-    known = len(names) > int(np.max(particles.typeid, initial=0))
-    type_names = [names[number] for number in particles.typeid] if known else []
+    type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
-        period, number, rows = values.get("box_length"), values.get(FORMAT_KEY), log.get(CONTACTS)
-        check_format(None if number is None else int(number), path)
+        period, rows = values.get("box_length"), log.get(CONTACTS)
         edges = None if period is None else np.diag([float(period), 1.0, 1.0])
-        slips = None if rows is None else slips_of(rows[rows[:, 0] > 0], "x_low" in columns)
-        given = pick_numbers(values)
-        return ParticleTable(str(path), columns, edges, type_names=type_names, given=given, slips=slips)
+        more = read_back(path, values, None if rows is None else rows[rows[:, 0] > 0], "x_low" in columns)
+        return particles_of(path, columns, edges, type_names=type_names, **more)
     if particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
     given = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
@@ -66,9 +59,8 @@ def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
     columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
     x, y, z, xy, xz, yz = (float(each) for each in box)
     edges = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
-    return ParticleTable(
-        str(path), columns, edges, -0.5 * edges.sum(axis=0), type_names=type_names, remark=GSD_PRECISION
-    )
+    corner = -0.5 * edges.sum(axis=0)
+    return particles_of(path, columns, edges, type_names=type_names, origin=corner, remark=GSD_PRECISION)
 
 
 def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -80,7 +72,7 @@ def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
             _fill(frame, exported)
             frame.configuration.step = number
             file.append(frame)
-    return f"{GSD_PRECISION}; the logged quantities have all of the packing in float64, and import takes these"
+    return f"{GSD_PRECISION}; the logged quantities are in float64, and import takes those of a packing of disks"
 
 
 def _fill(frame: Any, e: Exported) -> None:
@@ -115,22 +107,3 @@ def _fill(frame: Any, e: Exported) -> None:
     if e.rows is not None:  # gsd has no empty arrays: a row of zeros stands for no contact
         logged[CONTACTS] = e.rows if len(e.rows) else np.zeros((1, e.rows.shape[1]))
     frame.log = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in logged.items()}
-
-
-def read_universe(path: Path, frame: int | None = None) -> ParticleTable:
-    """Particles of a file of MDAnalysis."""
-    from MDAnalysis import Universe
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            universe = Universe(str(path))
-            universe.trajectory[-1 if frame is None else frame]
-    except Exception as error:  # its parsers raise nearly every exception there is
-        raise PackingFileError(f"{path} is not read by MDAnalysis: {str(error).splitlines()[0]}") from error
-    atoms, size = universe.atoms, universe.dimensions
-    columns = dict(zip("xyz", atoms.positions.astype(np.float64).T, strict=True))
-    if hasattr(atoms, "radii"):
-        columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
-    box = None if size is None else np.diag(size[:3].astype(np.float64))
-    return ParticleTable(str(path), columns, box, remark=f"MDAnalysis has positions {SINGLE_PRECISION}")
