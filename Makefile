@@ -5,7 +5,7 @@
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it
 # make check       format, lint and types
-# make benchmark   measures all that docs/benchmarks.md shows, and writes that page anew (an hour)
+# make benchmark   measures all that docs/benchmarks.md shows, and writes that page (twelve minutes)
 # make pictures    the report and the stiff cases that the documentation shows, anew and with the version that made
 #                  them, in docs/report and docs/extremes (a quarter of an hour); before a release
 # make wheel       sdist and wheel, to be given away, in dist/

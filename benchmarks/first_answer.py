@@ -1,21 +1,5 @@
-"""Where the time of `faultgouge onset` goes, and how long other commands take to their first line: README's scene.
+"""What a first answer costs, from the start of Python: `python benchmarks/first_answer.py [--fast]`."""
 
-One process after the other does what the command does, and says how long each part has taken:
-
-    imports     Python, NumPy, SciPy, MPI, LAMMPS and faultgouge, from files that are in memory already
-    settling    LAMMPS brings the loose packing to rest, and rattlers move to the middle of their cages
-    onset       the ramp, the search for the first complex pair, and the error of the path
-
-Then the commands themselves, `spectrum` with the ramp of README. Seconds of the processor, which other work on the
-machine changes little, and for commands also seconds of the clock to their first line: medians of several processes,
-with one thread each.
-
-    python benchmarks/first_answer.py [--turns 9]
-"""
-
-import argparse
-import os
-import platform
 import re
 import resource
 import statistics
@@ -26,49 +10,52 @@ import time
 from pathlib import Path
 from subprocess import PIPE
 
+HEAD = """## The first answer
+
+The scene of README, 100 disks: commands from the start of Python. Most of the imports are NumPy, SciPy, MPI and
+pydantic; `python -X importtime -m faultgouge onset scene.toml` lists them. Medians of {turns}.
+
+| | processor, s | first line after, s |
+|---|---|---|"""
+
 README = Path(__file__).parents[1] / "README.md"
-ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 PARTS = """
 import time
 from pathlib import Path
-import scipy.optimize, scipy.spatial
 import faultgouge.commands.onset
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.settling.settle import settle_bed
+from faultgouge.pywrap import Scene, settle
+from faultgouge import onset
 
 imports = time.process_time()
 scene = Scene.from_toml(Path("scene.toml"))
-bed = settle_bed(scene)
+settle(scene)
 settling = time.process_time()
-onset_run(scene, scene.law.mus[0], first=True, bed=bed)
+onset(scene)
 ends = 0.0, imports, settling, time.process_time()
 print(*(later - sooner for sooner, later in zip(ends, ends[1:])))
 """
 
-
-COMMANDS = {
-    "onset": "onset scene.toml",
-    "settle": "settle scene.toml -o settled.h5",
-    "spectrum": "spectrum run.h5 --frame 10",
-    "explain": "explain scene.toml",
-    "report --help": "report --help",
-    "--help": "--help",
-}
-"""Commands by the names of their rows."""
+COMMANDS = (
+    "onset scene.toml",
+    "settle scene.toml -o settled.h5",
+    "stability run.h5",
+    "spectrum run.h5 --frame 10",
+    "explain scene.toml",
+    "--help",
+)
 
 
 def run(folder: Path, *words: str) -> tuple[str, float, float]:
     """The output of a Python in a folder, the seconds to its first line, and those of the processor."""
     begin, before = time.time(), processor_seconds()
-    with subprocess.Popen([sys.executable, *words], cwd=folder, env=ENVIRONMENT, stdout=PIPE, stderr=PIPE) as process:
+    with subprocess.Popen([sys.executable, *words], cwd=folder, stdout=PIPE, stderr=PIPE) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
         first = time.time() - begin
         said, error = process.communicate()
     if process.returncode:
-        raise SystemExit(error.decode())
+        sys.exit(error.decode())
     return (line + said).decode(), first, processor_seconds() - before
 
 
@@ -79,29 +66,25 @@ def processor_seconds() -> float:
 
 
 def main() -> None:
-    """Print the medians."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--turns", type=int, default=9)
-    turns = parser.parse_args().turns
+    """Print the section."""
+    turns = 1 if "--fast" in sys.argv else 5
     (scene,) = re.findall(r"```toml\n(# scene.toml\n.*?)```", README.read_text(), re.DOTALL)
-    parts, times = [], {name: [] for name in COMMANDS}
+    parts, times = [], {command: [] for command in COMMANDS}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(scene)
         run(folder, "-m", "faultgouge", "ramp", "scene.toml", "-o", "run.h5")
         for _ in range(turns):
             parts.append([float(word) for word in run(folder, "-c", PARTS)[0].split()])
-            for label, words in COMMANDS.items():
-                times[label].append(run(folder, "-m", "faultgouge", *words.split())[1:])
+            for command in COMMANDS:
+                times[command].append(run(folder, "-m", "faultgouge", *command.split())[1:])
                 (folder / "settled.h5").unlink(missing_ok=True)
-    medians = [statistics.median(part) for part in zip(*parts, strict=True)]
-    print(f"{platform.machine()}; medians of {turns}")
-    print(f"  {'':28}{'processor':>10}{'share':>8}{'first line':>12}")
-    for label, seconds in zip(("imports", "settling", "onset"), medians, strict=True):
-        print(f"  {label:28}{seconds:9.2f}s{seconds / sum(medians):8.0%}")
-    for label, both in times.items():
+    print(HEAD.format(turns=turns))
+    for label, seconds in zip(("imports", "settling", "settling and onset"), zip(*parts, strict=True), strict=True):
+        print(f"| {label} | {statistics.median(seconds):.2f} | |")
+    for command, both in times.items():
         first, processor = (statistics.median(each) for each in zip(*both, strict=True))
-        print(f"  {'faultgouge ' + label:28}{processor:9.2f}s{'':8}{first:11.2f}s")
+        print(f"| `faultgouge {command}` | {processor:.2f} | {first:.2f} |")
 
 
 if __name__ == "__main__":

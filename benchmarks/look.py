@@ -1,32 +1,28 @@
-"""What a look at a live LAMMPS costs, and its proof: seconds of the processor, copies of the process included.
-
-Spheres of gran/hertz/history rest on a simple cubic lattice in a box that is periodic along all axes; each has six
-contacts. Looks without and with the proof are taken in turns, and the medians are printed with quartiles.
-
-    python benchmarks/look.py [--spheres 100 1000 10000] [--turns 5]
-"""
+"""What a look at a live LAMMPS costs, and its proof, copies of the process included: `look.py [--fast]`."""
 
 import os
-
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
-
-import argparse
+import sys
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
-from faultgouge.pywrap import from_lammps
+from faultgouge.pywrap import from_lammps, lammps_instance
+
+HEAD = """## A look at a live LAMMPS, and its proof
+
+`from_lammps` without and with the proof of the result by a few of LAMMPS's own steps, in {turns} turns, with quartiles
+of the ratio. Spheres of `gran/hertz/history` rest on a simple cubic lattice, with six contacts each.
+
+| spheres | look, s | proof, s | proof : look |
+|---|---|---|---|"""
 
 LAW = "1e5 3e4 40 20 0.5 1"
 
 
 def spheres(count: int, folder: str) -> Any:
     """A LAMMPS with about so many spheres at rest."""
-    from mpi4py import MPI
-
-    from faultgouge.pywrap.lammps.instance import lammps_instance
-
     side = round(count ** (1 / 3))
     lmp = lammps_instance(MPI.COMM_SELF, f"{folder}/log.lammps")
     for line in (
@@ -48,22 +44,20 @@ def seconds(lmp: Any, prove: bool) -> float:
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--spheres", type=int, nargs="*", default=[100, 1000, 10000])
-    parser.add_argument("--turns", type=int, default=5)
-    options = parser.parse_args()
-    print(f"{'spheres':>8s}{'look s':>10s}{'proof s':>10s}{'proof : look':>26s}", flush=True)
-    for count in options.spheres:
+    """Print the section."""
+    few = "--fast" in sys.argv
+    turns = 3 if few else 7
+    print(HEAD.format(turns=turns))
+    for count in (125,) if few else (125, 1000, 10_648):
         with TemporaryDirectory() as folder:
             lmp = spheres(count, folder)
             seconds(lmp, True)  # laws are measured, and modules imported, once
-            found = np.array([[seconds(lmp, prove) for prove in (False, True)] for _ in range(options.turns)])
+            found = np.array([[seconds(lmp, prove) for prove in (False, True)] for _ in range(turns)])
             looks, proofs = found[:, 0], found[:, 1] - found[:, 0]
             low, median, high = np.percentile(proofs / looks, [25, 50, 75])
             print(
-                f"{lmp.get_natoms():8.0f}{np.median(looks):10.3f}{np.median(proofs):10.3f}"
-                f"{f'{median:.2f} [{low:.2f}, {high:.2f}]':>26s}",
+                f"| {lmp.get_natoms():.0f} | {np.median(looks):.2f} | {np.median(proofs):.2f} | "
+                f"{median:.2f} [{low:.2f}, {high:.2f}] |",
                 flush=True,
             )
             lmp.close()

@@ -1,10 +1,6 @@
-"""What each part of a scene costs: its undamped run in LAMMPS with a feature and without it, in turns.
+"""What each part of a scene costs, with it and without it in turns: `python benchmarks/parts.py [--fast] [SCENE]`.
 
-    python benchmarks/parts.py scenes/paper.toml
-
-Both runs of a feature take so many steps in a turn as need ten milliseconds, in turns, of which every other begins with
-the second. The ratio is that of two runs in one turn, of processor time; the median over the turns is printed with its
-quartiles, since the slowest turns would dominate a mean.
+Both runs of a feature take so many steps in a turn as need ten milliseconds; every other turn begins with the second.
 """
 
 import sys
@@ -26,7 +22,15 @@ from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.lammps.dynamics import Dynamics
 from faultgouge.pywrap.lammps.plain_file_names import temporary_folder
 
-TURNS, SECONDS_A_TURN, TRIAL = 12, 10e-3, 200
+HEAD = """## What each part of a scene costs
+
+Undamped runs of `{scene}` in LAMMPS that differ in one part, in {turns} turns: the median of the ratios, with
+quartiles. `faultgouge explain` says which parts a scene has.
+
+| part | with it : without it | µs a step without |
+|---|---|---|"""
+
+SECONDS_A_TURN, TRIAL = 10e-3, 200
 
 QUIET_SHARE = 1e-4
 """Time step of the runs, in units of the decks': a packing that has lost its floor or its sides stays what it is while
@@ -37,22 +41,24 @@ Run = tuple[Packing, dict[str, Any]]
 
 
 def main() -> None:
-    """Print a row of Markdown for each feature of the scene that is named."""
-    scene, _ = affordable(Scene.from_toml(sys.argv[1]))
+    """Print the section."""
+    turns = 3 if "--fast" in sys.argv else 12
+    (name,) = [word for word in sys.argv[1:] if word != "--fast"] or ["scenes/paper.toml"]
+    scene, _ = affordable(Scene.from_toml(name))
     packing = settle(scene).packing
-    print("| feature | with it : without it [quartiles] | us a step without |\n|---|---|---|")
-    for name, without, with_it in features(packing, run_of(scene, packing)):
+    print(HEAD.format(scene=name, turns=turns))
+    for part, without, with_it in features(packing, run_of(scene, packing)):
         with set_up(without[0], **without[1]) as (_, plain), set_up(with_it[0], **with_it[1]) as (_, other):
             plain.advance(TRIAL)
             steps = max(50, int(SECONDS_A_TURN * TRIAL / seconds_of(plain, TRIAL)))
             other.advance(2 * TRIAL)
-            seconds = np.empty((TURNS, 2))
-            for turn in range(TURNS):
+            seconds = np.empty((turns, 2))
+            for turn in range(turns):
                 for place in (1, 0) if turn % 2 else (0, 1):
                     seconds[turn, place] = seconds_of((plain, other)[place], steps)
         low, middle, high = np.quantile(seconds[1:, 1] / seconds[1:, 0], (0.25, 0.5, 0.75))
         microseconds = 1e6 * np.median(seconds[1:, 0]) / steps
-        print(f"| {name} | {middle:.2f} [{low:.2f}, {high:.2f}] | {microseconds:.1f} |")
+        print(f"| {part} | {middle:.2f} [{low:.2f}, {high:.2f}] | {microseconds:.1f} |")
 
 
 def seconds_of(dynamics: Dynamics, steps: int) -> float:

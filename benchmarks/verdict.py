@@ -1,75 +1,55 @@
-"""Time and memory of `stability` for 10,000 spheres with contacts at Coulomb's bound, on one thread.
+"""`stability` of large beds of spheres, and its rates beside Bloch's theorem: `python benchmarks/verdict.py [--fast]`.
 
-Fifty spheres are poured on a slope in LAMMPS, come to rest, and are copied side by side: a bed whose motion is known
-from that of the fifty, which are followed in smaller steps from more pushes. One of the two beds rests, and the other
-one grows. Beds of as many spheres as one likes are poured, too, and a bed of a thousand spheres, ten deep, with a
-restitution of 0.8, comes to rest and is copied. The columns are: contacts at the bound; the verdict;
-the growth rate of D, or the largest D over the square of the push; how long the motion was followed; the rate below
-which linear growth may not have been seen; seconds of the processor; and memory.
-
-    python benchmarks/verdict.py [--copies 15 16] [--poured 2000] [--deep 10]
-
-Without the copies, `--copies 0 0`, it has the beds that are poured alone.
+Fifty spheres are poured on a slope in LAMMPS, come to rest, and are copied side by side in a periodic box. By Bloch's
+theorem a motion of the copies is one of the fifty times exp(i k r), with a wave vector k that fits the box. So the
+eigenvalues of thousands of spheres, with all contacts sticking, are those of a small matrix for each wave vector, of
+which two opposite ones have the same but for the sign of Im s.
 """
 
-import os
-
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
-
-import argparse
 import multiprocessing
 import resource
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
-from mpi4py import MPI
+from scipy.sparse import csr_array
 
-from faultgouge.analysis import Configuration, LinearisedContacts, Stability, stability
+from faultgouge.analysis import Configuration, LinearisedContacts, stability
 from faultgouge.analysis.contacts import PER_CONTACT
-from faultgouge.pywrap import from_lammps, lammps_instance, relax
+from faultgouge.analysis.motion.linear import linear_verdict
+from faultgouge.analysis.motion.motion import Motion
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from research.lammps_laws.compute import pour, rest
 
+HEAD = """## Does a bed of thousands of spheres move?
+
+`stability` of beds that are poured in LAMMPS, and of copies of fifty spheres side by side, with contacts at Coulomb's
+bound. D is the mean square displacement: its fastest growth or slowest decay, or its largest value over the square of
+the push where contacts at the bound bring the motion to rest.
+
+| | spheres | at the bound | verdict | D | s | GB |
+|---|---|---|---|---|---|---|"""
+
+BLOCH = """
+With all contacts sticking, the slowest decay 2 Re s by the certificate and the slow motions one by one
+([how](contacts_at_bound.md)), and by Bloch's theorem:
+
+| copies of fifty | coordinates | found | its error | by Bloch | s | GB |
+|---|---|---|---|---|---|---|"""
+
 BEDS = {
-    "rests": ("granular hertz, mindlin/force", 0.3, 40.0),
-    "grows": ("gran/hertz/history", 0.3, 4.0),
+    "at rest": ("granular hertz, mindlin/force", 0.3, 40.0),
+    "growing": ("gran/hertz/history", 0.3, 4.0),
 }
 """Law, slope and dashpots of the fifty spheres."""
 
-POURED = ("gran/hertz/history", 0.0, (40.0, 4.0))
-"""Those of beds that are poured as a whole: on a slope one or the other of thousands of spheres rolls on for ever."""
-
-
-DEEP = """
-units lj
-atom_style sphere
-boundary p p f
-newton off
-comm_modify vel yes
-region box block 0 {width} 0 {width} 0 60
-create_box 2 box
-{places}
-set type 1 diameter 0.8
-set type 2 diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji
-fix floor all wall/gran granular hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji &
-  zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-3
-fix drag all viscous 0.5
-run 15000 post no
-fix drag all viscous 4.0
-fix spin all viscous/sphere 0.4
-run 10000 post no
-"""
-"""Deck of the bed that is ten deep."""
+NEIGHBOURS = 5
+"""Copies along each axis in which those that a copy touches are told apart."""
 
 
 def bed(law: str, count: int, slope: float, dashpot: float) -> Configuration:
@@ -80,24 +60,7 @@ def bed(law: str, count: int, slope: float, dashpot: float) -> Configuration:
         found = rest(lmp)
         lmp.close()
     if found is None:
-        raise SystemExit(f"{count} spheres on a slope of {slope} do not come to rest: take a smaller slope.")
-    return found
-
-
-def deep_bed(across: int = 10, deep: int = 10) -> Configuration:
-    """Spheres of two sizes that fall into a periodic box with a floor, in as many layers, and come to rest."""
-    random, width = np.random.default_rng(1), 1.05 * across
-    places = []
-    for k in range(across**2 * deep):
-        x, y = (np.array(divmod(k % across**2, across)) + 0.5) * 1.05 + random.uniform(-0.1, 0.1, 2)
-        z = 0.6 + 1.05 * (k // across**2) + random.uniform(0, 0.02)
-        places.append(f"create_atoms {random.integers(1, 3)} single {x} {y} {z}")
-    with TemporaryDirectory() as folder:
-        lmp = lammps_instance(MPI.COMM_SELF, str(Path(folder) / "log"))
-        lmp.commands_string(DEEP.format(width=width, places="\n".join(places)))
-        relax(lmp, balance=1e-9)
-        found = from_lammps(lmp)
-        lmp.close()
+        sys.exit(f"{count} spheres on a slope of {slope} do not come to rest: take a smaller slope")
     return found
 
 
@@ -125,54 +88,69 @@ def tiled(cell: Configuration, across: int, deep: int) -> Configuration:
     )
 
 
-def measured(configuration: Configuration) -> tuple[Stability, float, float]:
-    """A verdict with its seconds and GB, in a process of its own."""
+def slowest_by_bloch(cell: Configuration, across: int, deep: int) -> float:
+    """The largest 2 Re s of copies, of all wave vectors."""
+    motion = Motion.of(tiled(cell, NEIGHBOURS, NEIGHBOURS), sliding=False)
+    size = len(motion.active) // NEIGHBOURS**2
+
+    def couplings(matrix: csr_array) -> np.ndarray:
+        """What the first copy feels of each copy, shape (5, 5, size, size)."""
+        return np.moveaxis(matrix[:size].toarray().reshape(size, NEIGHBOURS, NEIGHBOURS, size), 0, 2)
+
+    parts = [couplings(matrix) for matrix in (motion.stiffness, motion.damping)]
+    steps = np.fft.fftfreq(NEIGHBOURS, 1 / NEIGHBOURS)  # 0, 1, 2, -2, -1 copies away
+    largest = -np.inf
+    for x, y in np.ndindex(across, deep):
+        if (x, y) > (-x % across, -y % deep):
+            continue
+        phase = np.exp(2j * np.pi * np.add.outer(x * steps / across, y * steps / deep))
+        a, g = (np.tensordot(phase, part, 2) for part in parts)
+        scale = np.sqrt(np.abs(a).sum(axis=1).max())  # so that both halves weigh as much
+        first_order = np.block([[np.zeros_like(a), scale * np.eye(size)], [-a / scale, -g]])
+        largest = max(largest, 2 * float(np.linalg.eigvals(first_order).real.max()))
+    return largest
+
+
+def alone(compute: Callable[..., Any], *given: Any) -> tuple[Any, float, float]:
+    """A result with its seconds and GB, from a process of its own."""
     with multiprocessing.get_context("fork").Pool(1) as pool:
-        return pool.apply(_measure, (configuration,))
+        return pool.apply(_timed, (compute, *given))
 
 
-def _measure(configuration: Configuration) -> tuple[Stability, float, float]:
+def _timed(compute: Callable[..., Any], *given: Any) -> tuple[Any, float, float]:
     begin = time.process_time()
-    found = stability(configuration)
+    found = compute(*given)
     return found, time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
-def show(name: str, configuration: Configuration) -> None:
-    """Print a row."""
-    found, seconds, memory = measured(configuration)
-    verdict = {True: "rests", False: "grows", None: "not known"}[found.stable]
-    told = found.one_sided or {"growth_rate": found.growth_rate, "amplification": np.nan, "time": 0.0}
-    size = f"exp({told['growth_rate']:.3g} t)" if found.stable is False else f"{told['amplification']:.3g}"
-    print(
-        f"{name:24s}{len(configuration):8d}{found.at_bound:9d}{verdict:>11s}{size:>14s}{told['time']:8.3g}"
-        f"{found.sticking.searched:9.2g}{seconds:8.0f}{memory:6.2f}",
-        flush=True,
-    )
+def sticking(cell: Configuration, across: int, deep: int) -> tuple[float, float]:
+    """The slowest 2 Re s of copies whose contacts all stick, and its error."""
+    found = linear_verdict(Motion.of(tiled(cell, across, deep), sliding=False))
+    return found.growth_rate, found.error
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--copies", type=int, nargs=2, default=[15, 16], help="along x and along y; 0 0 for none")
-    parser.add_argument("--poured", type=int, nargs="*", default=[], help="spheres of beds that are poured")
-    parser.add_argument("--deep", type=int, default=0, help="copies of a bed of a thousand spheres, ten deep")
-    options = parser.parse_args()
-    print(
-        f"{'':24s}{'spheres':>8s}{'at bound':>9s}{'':>11s}{'D':>14s}{'t':>8s}{'sought':>9s}{'s':>8s}{'GB':>6s}",
-        flush=True,
-    )
-    for name, (law, slope, dashpot) in BEDS.items() if min(options.copies) else ():
-        cell = bed(law, 50, slope, dashpot)
-        show(f"fifty, one that {name}", cell)
-        show("copies of these", tiled(cell, *options.copies))
-    for count in options.poured:
-        law, slope, dashpots = POURED
-        for dashpot in dashpots:
-            show(f"poured, dashpots {dashpot:g}", bed(law, count, slope, dashpot))
-    if options.deep:
-        cell = deep_bed()
-        show("a thousand, ten deep", cell)
-        show("copies of these", tiled(cell, options.deep, 1))
+    """Print the section."""
+    few = "--fast" in sys.argv
+    print(HEAD, flush=True)
+    cells = {name: bed(law, 50, slope, dashpot) for name, (law, slope, dashpot) in BEDS.items()}
+    beds = {f"fifty, {name}": cell for name, cell in cells.items()}
+    beds |= {"copies of the growing fifty": tiled(cells["growing"], *((2, 2) if few else (15, 16)))}
+    beds |= {f"poured, dashpots {g:g}": bed("gran/hertz/history", 50 if few else 200, 0.0, g) for g in (40.0, 4.0)}
+    for name, here in beds.items():
+        found, seconds, memory = alone(stability, here)
+        told = found.one_sided or {"growth_rate": found.growth_rate}
+        bounded = found.stable is not False and found.one_sided
+        size = f"{told['amplification']:.3g}" if bounded else f"exp({told['growth_rate']:.3g} t)"
+        verdict = {True: "rests", False: "grows", None: "not known"}[found.stable]
+        row = (name, len(here), found.at_bound, verdict, size, f"{seconds:.0f}", f"{memory:.2f}")
+        print("| " + " | ".join(map(str, row)) + " |", flush=True)
+    print(BLOCH, flush=True)
+    for copies in ((2, 2),) if few else ((4, 5), (8, 8)):
+        (rate, error), seconds, memory = alone(sticking, cells["at rest"], *copies)
+        known = slowest_by_bloch(cells["at rest"], *copies)
+        row = ("{} x {}".format(*copies), cells["at rest"].coordinates * np.prod(copies), f"{rate:.7f}", f"{error:.0e}")
+        print("| " + " | ".join(map(str, (*row, f"{known:.7f}", f"{seconds:.0f}", f"{memory:.2f}"))) + " |", flush=True)
 
 
 if __name__ == "__main__":
