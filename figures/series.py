@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import ElasticModuli, Growth, Packing, PlaneWave, Vibrations
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.responses.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 from faultgouge.analysis.responses.slips import Slip
 
 from .style import EDGE, FLOOR, INK, MOBILIZATION, figure_of, styled
@@ -134,12 +134,6 @@ def few_decades(axes: Axes, count: int = 7) -> None:
             axis.set_major_locator(LogLocator(numticks=count))
 
 
-def scientific(value: float) -> str:
-    """1.2 x 10^-3 for mathtext."""
-    exponent = int(np.floor(np.log10(value)))
-    return rf"{value / 10.0**exponent:.1f} \times 10^{{{exponent}}}"
-
-
 @styled
 def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
@@ -163,11 +157,6 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     axes.set(xlabel=label, ylabel="$F_x$")
     axes.margins(0.08)
     axes.legend(title="$F_x$", fontsize=7, title_fontsize=7)
-    left = hysteresis(packings)
-    if left is not None:
-        words = f"remains: {_format_signed(left.remaining)}, work: {_format_signed(left.work)}"
-        says = "the path closes, to rounding" if left.closes else words
-        axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
     return figure_of(axes)
 
 
@@ -176,10 +165,6 @@ def in_powers_of_ten(moved: Floats) -> tuple[Floats, str]:
     power = int(np.floor(np.log10(np.abs(moved).max() or 1.0)))
     unit = rf" $/\,10^{{{power}}}$" if power else ""
     return moved / 10.0**power, f"displacement of the upper layer{unit}"
-
-
-def _format_signed(value: float) -> str:
-    return "0" if value == 0 else f"${'-' if value < 0 else ''}{scientific(abs(value))}$"
 
 
 @styled

@@ -198,7 +198,11 @@ def draw_cycle_spectrum(
 
 DRAWN = {
     "complex pairs": {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
-    "growth rate of $D$": {"undamped_sticking": "undamped", "damped_sticking": "damped", "damped_sliding": "sliding"},
+    "growth rate of $D$": {
+        "undamped_sticking": "undamped",
+        "damped_sticking": "damped",
+        "damped_sliding": "damped, sliding",
+    },
     "lowest eigenvalue": {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
 }
 """Numbers of states that the panels below the force show."""

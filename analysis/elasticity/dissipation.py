@@ -80,17 +80,14 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
         )
     if configuration.stiffness is not None:
         raise BadInputError("The law of each contact is needed, and this packing has K by differences of forces.")
-    stiff, limit = c.tangential_stiffness[:, None], c.normal_force.copy()
+    stiff, limit, force, b = c.tangential_stiffness[:, None], c.normal_force, c.tangential_force, c.overlap_derivative()
     share = np.divide(c.friction, c.normal_force, out=np.full(len(c), np.inf), where=c.normal_force > 0)
-    force, b = c.tangential_force.copy(), c.overlap_derivative()
-    taken, powers = np.zeros((3, len(c))), []
-    totals, before = [0.0], (np.zeros(len(c)), np.zeros((len(c), 3)))
+    taken, powers, totals = np.zeros((3, len(c))), list[Floats](), [0.0]
+    before = np.zeros(len(c)), np.zeros((len(c), 3))
     for k, (q, v) in enumerate(zip(moved, speed, strict=True)):
-        overlap, slip = _rates(configuration, q)
-        growth, sliding = _rates(configuration, v)
-        step = overlap - before[0], slip - before[1]
-        force = force - stiff * step[1] + b * step[0][:, None]
-        limit = limit + c.normal_stiffness * step[0]
+        (overlap, slip), (growth, sliding) = _rates(configuration, q), _rates(configuration, v)
+        force = force - stiff * (slip - before[1]) + b * (overlap - before[0])[:, None]
+        limit = limit + c.normal_stiffness * (overlap - before[0])
         size, bound = np.linalg.norm(force, axis=1), share * np.maximum(limit, 0.0)
         excess = np.where(size > bound, size - np.where(np.isfinite(bound), bound, size), 0.0)
         slid = np.divide(excess, stiff[:, 0], out=np.zeros_like(excess), where=stiff[:, 0] > 0)
@@ -99,8 +96,7 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
                           c.tangential_dashpot * np.einsum("ca,ca->c", sliding, sliding) * (slid == 0)])  # fmt: skip
         powers.append(power)
         if k:
-            half = 0.5 * (t[k] - t[k - 1]) * (powers[-1] + powers[-2])
-            taken[:2] += half
+            taken[:2] += 0.5 * (t[k] - t[k - 1]) * (powers[-1] + powers[-2])
             taken[2] += (size - excess) * slid
             totals.append(float(taken.sum()))
         before = overlap, slip
@@ -112,13 +108,10 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
 def _rates(configuration: Configuration, moved: Floats) -> tuple[Floats, Floats]:
     """Changes of the overlaps, shape (C,), and slips, (C, 3), of displacements or velocities."""
     c = configuration.contacts
-    shift, turn = configuration.vectors(moved)
-    radius = configuration.radius
-    second = np.where(c.wall, 0, c.j)
-    other = np.where(c.wall[:, None], 0.0, shift[second])
-    u = shift[c.i] - other
-    rolls = np.where(c.wall[:, None], 0.0, (c.slip_arm[:, 1] / radius[second])[:, None] * turn[second])
-    w = (c.slip_arm[:, 0] / radius[c.i])[:, None] * turn[c.i] + rolls
+    (shift, turn), radius = configuration.vectors(moved), configuration.radius
+    second, pair = np.where(c.wall, 0, c.j), ~c.wall[:, None]
+    rolls = pair * (c.slip_arm[:, 1] / radius[second])[:, None] * turn[second]
+    u, w = shift[c.i] - pair * shift[second], (c.slip_arm[:, 0] / radius[c.i])[:, None] * turn[c.i] + rolls
     along = np.einsum("ca,ca->c", c.normal, u)
     return -along, ~c.couple[:, None] * (u - along[:, None] * c.normal) + np.cross(c.normal, w)
 

@@ -188,24 +188,22 @@ def volume_of(configuration: Configuration, volume: float | None = None) -> tupl
     c, d = configuration.contacts, configuration.dimension
     if volume is not None:
         return float(volume), f"volume {volume:g} as given"
-    edges, words = configuration.box.copy(), []
+    edges, words, sides = configuration.box.copy(), [], {(a, s): place for a, s, place in configuration.planes}
     edges[d:] = np.eye(3)[d:]
     for axis in range(d):
         if configuration.periodic[axis]:
             words.append(f"periodic along {AXIS_NAMES[axis]}")
             continue
-        flat = c.wall & (np.abs(np.abs(c.normal[:, axis]) - 1) < FLAT_NORMAL)
-        inwards, side = c.normal[flat, axis], configuration.position[c.i[flat], axis]
-        surface = side - inwards * (configuration.radius[c.i[flat]] - c.overlap[flat])
-        low, high = surface[inwards > 0], surface[inwards < 0]
-        if not len(low) or not len(high) or np.any(c.wall & ~flat & (np.abs(c.normal[:, axis]) > FLAT_NORMAL)):
+        low, high, along = sides.get((axis, 1.0)), sides.get((axis, -1.0)), np.abs(c.normal[:, axis])
+        tilted = np.any(c.wall & (along > FLAT_NORMAL) & (along < 1 - FLAT_NORMAL))
+        if low is None or high is None or tilted:
             raise BadInputError(
                 f"The packing has no volume: along {AXIS_NAMES[axis]} it is neither periodic nor between two flat "
                 "walls that it touches; give volume=, the volume (area of disks) that is meant."
             )
         edges[axis] = 0.0
-        edges[axis, axis] = high.max() - low.min()
-        words.append(f"between walls at {AXIS_NAMES[axis]} = {low.min():g} and {high.max():g}")
+        edges[axis, axis] = high - low
+        words.append(f"between walls at {AXIS_NAMES[axis]} = {low:g} and {high:g}")
     return float(abs(np.linalg.det(edges))), ", ".join(words)
 
 

@@ -85,14 +85,6 @@ class Border(NamedTuple):
         """Number of modes in the slice."""
         return self.modes[1] - self.modes[0]
 
-    @classmethod
-    def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """The border of a slice, from increasing eigenvalues, the number of the first, and which are its own."""
-        near = values[max(0, own.start - 1) : own.stop + 1]
-        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
-        modes = number + own.start, number + own.stop
-        return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
-
 
 @dataclass(frozen=True, eq=False)
 class Slice:
@@ -119,7 +111,11 @@ class Slice:
     @property
     def border(self) -> Border:
         """The border, on which its neighbours must agree."""
-        return Border.of(self.first, self.values, self.own)
+        values, own = self.values, self.own
+        near = values[max(0, own.start - 1) : own.stop + 1]
+        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
+        modes = self.first + own.start, self.first + own.stop
+        return Border(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
 
 
 def factor_shifted(matrix: csc_array, shift: float) -> Factorization:
@@ -209,14 +205,13 @@ class SlicedSpectrum:
                 shift = 0.5 * (shift + high) if np.isfinite(high) else shift + step * min(most / max(ahead, 1), 2.0)
                 continue
             part = self.slice_about(shift, (first, min(stop, 2 * below - first)), margin, (solve, below))
-            if before is not None:
-                try:
-                    compare_slices(before, part.border)
-                except SliceError:
-                    if again:
-                        raise
-                    shift, again = low + 0.8 * (shift - low), True
-                    continue
+            try:
+                compare_slices(*([] if before is None else [before]), part.border)
+            except SliceError:
+                if again:
+                    raise
+                shift, again = low + 0.8 * (shift - low), True
+                continue
             again = False
             yield part, partial(self._in_order, solve)
             first, before, low, high = part.border.modes[1], part.border, float(part.values[part.own][-1]), np.inf
@@ -268,20 +263,8 @@ class SlicedSpectrum:
         chosen, found = vectors[:, order[kept]], np.empty((size, kept.stop - kept.start))
         for rows in self.sizes.chunks(size):
             found[self.order[rows]] = krylov.basis[: len(inverse), rows].T @ chosen
-        part = Slice(
-            first=first + kept.start,
-            values=values[kept],
-            vectors=found,
-            own=slice(start, start + own[1] - own[0]),
-        )
-        self.compare(part)
-        return part
-
-    def compare(self, part: Slice) -> None:
-        """Raise an error if inaccurate factors gave the slice other eigenvalues than the matrix has.
-
-        The Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself.
-        """
+        part = Slice(first + kept.start, values[kept], found, slice(start, start + own[1] - own[0]))
+        # the Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself
         values, vectors = part.values[part.own], np.ascontiguousarray(part.vectors[:, part.own])
         quotients = np.zeros(len(values))
         for rows in self.sizes.chunks(len(vectors)):
@@ -293,6 +276,7 @@ class SlicedSpectrum:
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
                 f"{quotients[worst]:.10g} from the matrix: the factors are inaccurate; take other loads"
             )
+        return part
 
 
 DEPENDENT = 1e-10

@@ -87,7 +87,7 @@ def telling(path: object, says: str, errors: type[Exception] = Exception) -> Ite
     """
     try:
         yield
-    except PackingFileError:
+    except (PackingFileError, MemoryError):
         raise
     except errors as error:
         reason = str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".")
@@ -210,8 +210,9 @@ def check_own(path: Path, head: str = "") -> None:
 
 def check_format(number: object, where: object) -> None:
     """Refuse a file of a later format with a PackingFileError; files of older versions have no number, None."""
-    if number is not None and not (str(number).isdecimal() and int(str(number)) <= FORMAT):
-        says = f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}"
+    known = str(number).removesuffix(".0")
+    if number is not None and not (known.isdecimal() and int(known) <= FORMAT):
+        says = f"{where} has format {known} of faultgouge's files, and this version knows {FORMAT}"
         raise PackingFileError(f"{says}: a later version wrote it, so update faultgouge.")
 
 

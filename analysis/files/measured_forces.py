@@ -50,7 +50,7 @@ NO_RATE = "no growth rate is given: it comes from the small asymmetric part of K
 def is_measured(contacts: Path) -> bool:
     """Whether a table of contacts has rows of five numbers between commas from its first line on."""
     with contacts.open(errors="replace") as lines:
-        return bool(re.fullmatch(r"\s*(?:[-+.\deE]+|nan|inf)(?:,\s*(?:[-+.\deE]+|nan|inf)\s*){4}", next(lines, "")))
+        return bool(re.fullmatch(",".join(5 * [r"\s*(?:[-+.\deE]+|nan|inf)\s*"]), next(lines, "")))
 
 
 def _rows(path: Path, *widths: int) -> Floats:

@@ -286,8 +286,16 @@ class Packing:
 
         For a compensated packing the sum is in numpy's long doubles, which have 64 bits on x86.
         """
-        i, j, pair = self.contacts.i, self.contacts.j, ~self.contacts.floor
-        fn, ft, normal = self._contact_forces
+        c, pair = self.contacts, ~self.contacts.floor
+        i, j, fn, ft, normal = c.i, c.j, self.normal_force, self.tangential_force, self.geometry.normal
+        if self.compensated:
+            _, branch, overlap = self._exact_geometry
+            delta, between = np.add(*overlap, dtype=np.longdouble), np.add(*branch, dtype=np.longdouble)
+            slip = np.add(c.slip, 0.0 if c.slip_low is None else c.slip_low, dtype=np.longdouble)
+            distance = np.sqrt(np.sum(between * between, axis=1))
+            distance[c.floor] = between[c.floor, 1]
+            fn, ft = self.law.normal_force(delta), self.law.tangential_force(delta, slip)
+            normal = between / distance[:, None]
         on_i = np.column_stack([fn * normal[:, 0] - ft * normal[:, 1], fn * normal[:, 1] + ft * normal[:, 0]])
         total = np.zeros((3, len(self)), fn.dtype)
         total[0, self.top] = self.fx
@@ -298,21 +306,6 @@ class Packing:
         np.subtract.at(total[2], i, ft)
         np.subtract.at(total[2], j[pair], ft[pair])
         return frozen(total.ravel().astype(np.float64))
-
-    @property
-    def _contact_forces(self) -> tuple[NDArray, NDArray, NDArray]:
-        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep the low parts."""
-        if not self.compensated:
-            return self.normal_force, self.tangential_force, self.geometry.normal
-        _, branch, overlap = self._exact_geometry
-        delta = np.add(*overlap, dtype=np.longdouble)
-        low = self.contacts.slip_low
-        slip = np.add(self.contacts.slip, 0.0 if low is None else low, dtype=np.longdouble)
-        between = np.add(*branch, dtype=np.longdouble)
-        distance = np.sqrt(np.sum(between * between, axis=1))
-        distance[self.contacts.floor] = between[self.contacts.floor, 1]
-        normal = between / distance[:, None]
-        return self.law.normal_force(delta), self.law.tangential_force(delta, slip), normal
 
     def moved(
         self,

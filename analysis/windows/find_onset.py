@@ -15,7 +15,6 @@ from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
 from .motions import Motions, System, force_bearing
 from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
@@ -230,7 +229,7 @@ def find_onset(
             ends.append(start.fx)
             opened = float(negative[0]), 1.0
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        elif (first or not takes_all) and not isinstance(start, Packing):
+        elif (first or not takes_all) and start.law is None:
             at_start = _complex_at_start(start)
         if opened is None and at_start is None:
             try:

@@ -110,12 +110,12 @@ def prove(lmp: Any, configuration: Configuration, others: str, *, extrapolates: 
         return difference
     says = (
         f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
-        f"by {difference:.2g} of itself; {_likely(c, difference, others)}."
+        f"by {difference:.2g} of itself; {_likely(c, others)}."
     )
     raise (NotProvedError if by_laws and others else NotTakenError)(says)
 
 
-def _likely(c: Configuration, difference: float, others: str) -> str:
+def _likely(c: Configuration, others: str) -> str:
     """The likeliest causes of a motion that is another one."""
     close, causes = c.mobilised > CREEP_SHARE, [others] if others else []
     if close.any() and (others or np.any(close & ~c.contacts.at_bound)):

@@ -8,19 +8,24 @@ more.
 
 **A state that cannot be taken** is kept, so that hours of a run are not lost. A run of one step writes the restart
 file: in a file that `write_restart` writes after a run, LAMMPS leaves tangential histories out. The deck beside it goes
-on from there with the commands that hold.
+on from there with the commands that hold. Several ranks hand their state in such files to a process of one rank, as a
+look needs a copy of the process.
 """
 
 import ctypes
 import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
 from ...analysis import BadInputError, Configuration, NoEquilibriumError
+from ...analysis.files.configuration_file import read_configuration
 from ...plugin import directory
 from ..lammps.instance import lammps_instance
 from ..lammps.plain_file_names import shared_folder
@@ -34,6 +39,9 @@ WORLD = MPI.COMM_WORLD
 
 AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log", "-echo", "both")
 """Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands."""
+
+OF_RANKS = "PMI", "MPI", "OMPI", "HYD", "SLURM"
+"""Beginnings of the environment's names by which a process is one of several ranks."""
 
 BEFORE_RUNS = ctypes.CFUNCTYPE(None)(lambda: None)
 """What the plugin calls before the first run."""
@@ -106,6 +114,8 @@ def run_deck(
     try:
         if stopped:
             raise NotTakenError(f"{path}: {stopped}")
+        if WORLD.size > 1 and use is None:
+            return _on_one_rank(lmp, carried_out, path, balance, relaxes=relaxes)
         commands = commands_of(carried_out, "The deck has")
         if relaxes:
             for name, style in styles_of(lmp).fixes.items():
@@ -123,6 +133,27 @@ def run_deck(
         raise NotTakenError(f"{says}. {kept}".rstrip()) from error
     finally:
         lmp.close()
+
+
+def _on_one_rank(lmp: Any, carried_out: list[list[str]], deck: Path, balance: float, *, relaxes: bool) -> Configuration:
+    """The last state of several ranks, one step on, as `faultgouge import` of its restart file takes it on one rank."""
+    with shared_folder(WORLD) as folder:
+        kept, found, says = _keep_state(lmp, carried_out, folder / "state.restart", deck), None, ""
+        if WORLD.rank == 0:
+            words = ["import", "state.restart", "-o", "state.h5", "--balance", repr(balance), *["--relax"] * relaxes]
+            alone = {key: each for key, each in os.environ.items() if not key.startswith(OF_RANKS)}
+            command = [sys.executable, "-m", "faultgouge", *words]
+            done = subprocess.run(command, cwd=folder, env=alone, capture_output=True, text=True, check=False)
+            if done.returncode == 0:
+                one_on = f"the state is that of one rank, one step after the end of the deck on {WORLD.size} ranks"
+                read = read_configuration(folder / "state.h5")
+                found = replace(read, remarks=(*read.remarks, one_on))
+            else:  # what is kept there goes with the folder
+                says = done.stderr.strip().rpartition("Error: ")[2].partition(" The state, ")[0] or kept
+        found, says = WORLD.bcast((found, says), root=0)
+    if found is None:
+        raise NotTakenError(says)
+    return found
 
 
 def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:

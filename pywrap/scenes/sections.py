@@ -91,11 +91,8 @@ class Law(Section):
     @property
     def in_words(self) -> str:
         """The law of friction, as pages name it."""
-        return {
-            "total": "the paper's smoothed law",
-            "rescaled": "the smoothed law with rescaled slips",
-            "coulomb": "the standard law",
-        }[self.history]
+        smoothed = {"total": "the paper's smoothed law", "rescaled": "the smoothed law with rescaled slips"}
+        return smoothed.get(self.history, "the standard law")
 
 
 class Damping(Section):

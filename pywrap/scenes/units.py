@@ -275,8 +275,7 @@ def real_units(scene: Any) -> RealUnits | None:
         While the scene is checked: if its layer has no width, if its law is not Hertz's, or if the given overburden
         differs from the overburden of the scene's F_y.
     """
-    units = scene.units
-    if units is None:
+    if (units := scene.units) is None:
         return None
     check_exponent(scene.law.exponent)
     real = units_of(units, layer_of(scene.packing), scene.law.kn, scene.load.fy)
@@ -319,8 +318,8 @@ def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
     else:
         packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
         k, width = packing.radius.argmin(), packing.box_length
-        smallest = 2 * float(packing.radius[k]), float(packing.mass[k])
-        layer = Layer(*smallest, width or 0.0, int(packing.top.sum()))
+        diameter, mass = 2 * float(packing.radius[k]), float(packing.mass[k])
+        layer = Layer(diameter, mass, width or 0.0, int(packing.top.sum()))
     if width is None:
         raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
     return layer

@@ -7,21 +7,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from faultgouge.analysis import Packing
-
 
 def png(figure: "Figure") -> bytes:
     """A figure as a PNG."""
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=150)
     return stream.getvalue()
-
-
-def picture(packing: "Packing") -> bytes:
-    """The packing with its force chains, as a PNG."""
-    from faultgouge.figures import draw_packing
-
-    return png(draw_packing(packing))
 
 
 def show_pictures() -> None:
@@ -31,7 +22,9 @@ def show_pictures() -> None:
     shell = get_ipython()
     if shell is not None:
         pictures = shell.display_formatter.formatters["image/png"]
-        pictures.for_type_by_name("faultgouge.analysis.packing.packing", "Packing", picture)
+        pictures.for_type_by_name(
+            "faultgouge.analysis.packing.packing", "Packing", lambda each: png(sys.modules["faultgouge"].draw(each))
+        )
         # pyplot, where it is in use, shows figures in its own way
         if "matplotlib.pyplot" not in sys.modules:
             pictures.for_type_by_name("matplotlib.figure", "Figure", png)

@@ -94,8 +94,8 @@ def interrupted() -> bool:
     return bool(_signalled)
 
 
-def keeps(words: str) -> None:
-    """Set what is said at an interrupt: what is kept, and how to go on."""
+def keeps(words: str, path: object = None) -> None:
+    """Set what is said at an interrupt: what is kept (a record tells its file, too), and how to go on."""
     _put(WORDS, words)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from reference_layer import LAYER, REFERENCE, SMALL, toml
+from table_rows import rows_of
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.errors import OutputError
@@ -161,27 +162,7 @@ def test_a_file_that_another_run_writes_or_that_is_read_only_is_kept(refusal, st
         assert (stored / name).read_text() == "kept"
 
 
-OTHERS = {
-    "ramp scene.toml -o data.h5": "data.1.disks",
-    "drive drive.toml -o data.h5": "data.csv",
-    "onset scene.toml -o data.json": "data.json",
-    "draw run.h5 -o data.png": "data.png",
-    "draw run.h5 -o data.svg": "data.svg",
-    "draw run.h5 -o data.pdf": "data.pdf",
-    "movie run.h5 --mode 0 --seconds 2 --rate 6 --dots 40 -o data.gif": "data.gif",
-    "movie run.h5 --mode 0 --seconds 2 --rate 6 --dots 40 -o data.mp4": "data.mp4",
-    "view run.h5 -o data.html": "data.html",
-    **{f"export run.h5 -o data.{suffix}": f"data.{suffix}" for suffix in ("vtp", "xyz", "data", "gsd", "csv")},
-    "export run.h5 --frames all -o data.pvd": "data/00000.vtp",
-    "sweep sweep.toml -o out": "out/results.csv",
-    "sweep sweep.toml --workers 1 -o out": "out/sweep.json",
-    "trigger scene.toml -o out": "out/trigger.json",
-    "eruptions scene.toml -o out": "out/eruptions.md",
-    "modes scene.toml -o out": "out/modes.csv",
-    "reproduce -o out": "out/report.md",
-    "report -o out": "out/report.json",
-    "extremes -o out": "out/extremes.json",
-}
+OTHERS = dict(rows_of("cli/files_of_others.txt"))
 """Commands, and a file that each would replace."""
 SWEEP = 'task = "onset"\n[sweep]\n"packing.seed" = [1]\n' + toml(SMALL, "scene.")
 

@@ -294,7 +294,7 @@ PILE, ROW = DECK.format(**FLAT, word="contacts"), two_on_three()
 LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
 AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
 REFUSED = [
-    ("pile.in --kn 3", PILE, 2, "leave all options"),
+    ("pile.in --kn 3", PILE, 2, "only -o, --relax and --balance go with it"),
     ("pile.in --balance nan", PILE, 2, "greater than or equal to 0"),
     ("a.csv --balance 1", "", 2, "--balance is for a LAMMPS deck"),
     ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from reference_layer import LAYER, on_ranks, toml
+from table_rows import rows_of
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Engine, EngineError
@@ -106,25 +107,7 @@ def simulates(folder):
     return False
 
 
-@pytest.mark.parametrize(
-    ("command", "says"),
-    [
-        ("onset scene.toml -o onset.json", "nothing was written: give the same command again"),
-        (
-            "reproduce scene.toml -o out",
-            "out has the parts that were finished; the same command starts from the beginning and replaces",
-        ),
-        (
-            "stability --quick -o out",
-            "out has the cases that were finished; the same command starts from the beginning and replaces",
-        ),
-        ("eruptions scene.toml -o out", "out/eruptions.jsonl has the runs that were over; the same command continues"),
-        (
-            "sweep sweep.toml -o out",
-            "out/results.jsonl has the scenes that have ended; the same command continues from",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("command", "says"), rows_of("cli/kept_at_interrupts.txt"))
 @pytest.mark.long
 def test_what_is_kept_is_said(tmp_path, command, says):
     (tmp_path / "sweep.toml").write_text(SWEEP)

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 from reference_layer import toml
 
 from faultgouge.analysis import RunFile
@@ -38,7 +38,7 @@ def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_here_in):
         command = ("movie", f"{name}.h5", *more, "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
         faultgouge_here_in(beyond, *command)
         with Image.open(beyond / "film.gif") as gif:
-            assert gif.n_frames == 5
+            assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(gif)) == 1000
 
 
 DRIVE = {
@@ -81,7 +81,7 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     film = ("movie", "drive.h5", "--span", "1", "9", "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
     faultgouge_here(*film)
     with Image.open(tmp_path / "film.gif") as gif:
-        assert gif.n_frames == 5
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(gif)) == 1000
     assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", before).stdout
     backwards = faultgouge_here("movie", "drive.h5", "--span", "9", "1", "-o", "film.gif", code=2).stderr
     assert f"has 0 of its {len(times)} states between t = 9 and 1" in backwards

@@ -22,20 +22,14 @@ def there_and_back():
 @pytest.fixture(scope="session")
 def column():
     """Two spheres, one on the other on a floor, at rest under their weight of one each."""
-    from faultgouge.analysis import Configuration, LinearisedContacts
+    from faultgouge.analysis import Material
+    from faultgouge.analysis.elasticity.material_spheres import spheres_of_material
 
-    zero, up, arm = np.zeros(2), np.tile([0.0, 0.0, 1.0], (2, 1)), np.full((2, 2), 0.5)
-    contacts = LinearisedContacts(
-        i=[0, 1], j=[-1, 0], normal=up, distance=[np.inf, 0.98], overlap=[0.01, 0.02], slip_arm=arm, lever_arm=arm,
-        lever_slope=zero, normal_force=[2, 1], tangential_force=np.zeros((2, 3)), normal_stiffness=[300, 300],
-        tangential_stiffness=[200, 200], closing=np.zeros((2, 3)), parting=np.zeros((2, 3)), friction=[1, 0.5],
-        sliding=[False, False], normal_dashpot=zero, tangential_dashpot=zero,
-    )  # fmt: skip
-    load = np.zeros((2, 2, 3))
-    load[:, 0, 2] = -1
-    return Configuration(
-        dimension=3, position=[[0.5, 0.5, 0.49], [0.5, 0.5, 1.47]], radius=[0.5, 0.5], mass=[1, 1], inertia=[0.1, 0.1],
-        contacts=contacts, box=np.diag([1.0, 1.0, 3.0]), origin=np.zeros(3), periodic=[True, True, False], load=load,
+    contacts = np.array([0, 1]), np.array([-1, 0]), np.array([[0.0, 0.0, 0.49], [0.0, 0.0, 0.98]])
+    return spheres_of_material(
+        [[0.5, 0.5, 0.49], [0.5, 0.5, 1.47]], [0.5, 0.5], Material(kn=200.0, kt=150.0, exponent=1.0), mass=[1, 1],
+        box=np.diag([1.0, 1.0, 3.0]), periodic=[True, True, False], contacts=contacts, normal_force=np.array([2.0, 1]),
+        tangential_force=np.zeros((2, 3)),
     )  # fmt: skip
 
 

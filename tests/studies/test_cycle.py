@@ -144,4 +144,3 @@ def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgoug
     with RunFile(slow) as file:
         expected = cycle_state(file.packing(0), SPRING)["lowest_sticking"]
     assert found["eigenvalues"][0][0] == pytest.approx(expected, rel=1e-9)
-    assert "K has the stiffness of the spring" in faultgouge_here("spectrum", slow, "--frame", "0").stdout

@@ -38,19 +38,16 @@ def table(folder):
         return list(csv.DictReader(file))
 
 
-def test_points_are_the_product_with_the_last_key_fastest():
+def test_points_are_the_product_and_keys_those_of_scenes():
+    """The last key varies fastest."""
     sweep = sweep_of({"packing.seed": "3:4", "load.fy, ramp.until": [[3.0, 0.02], [6.0, 0.04]]})
     assert sweep.names == ["packing.seed", "load.fy", "ramp.until"]
     values = [tuple(p.values.values()) for p in sweep.points]
     assert values == [(3, 3.0, 0.02), (3, 6.0, 0.04), (4, 3.0, 0.02), (4, 6.0, 0.04)]
     assert values == [(p.scene.packing.seed, p.scene.load.fy, p.scene.ramp.until) for p in sweep.points]
-
-
-def test_a_key_belongs_to_the_scene_and_not_to_the_sweep():
-    one = sweep_of({"packing.seed": [2]}).points[0]
-    other = sweep_of({"law.mu": [0.5, 1.0], "packing.seed": [1, 2]}).points[3]
-    assert one.key == other.key  # mu = 1 is the default
-    assert one.key != sweep_of({"packing.seed": [2]}, task="triggering").points[0].key
+    one, other = sweep_of({"packing.seed": [2]}), sweep_of({"law.mu": [0.5, 1.0], "packing.seed": [1, 2]})
+    assert one.points[0].key == other.points[3].key  # mu = 1 is the default
+    assert one.points[0].key != sweep_of({"packing.seed": [2]}, task="triggering").points[0].key
 
 
 @pytest.mark.parametrize(

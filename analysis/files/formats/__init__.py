@@ -164,8 +164,8 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
     taken = FILMS if frames else tuple(WRITERS)[:-1]
     if path.suffix not in taken:
-        what = "several frames go into" if frames else "exports are .pvd with --frames all, and"
-        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}; give it one of these suffixes.")
+        what, more = ("several frames go into", "") if frames else ("exports are", "; for a .pvd add --frames all")
+        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}{more}; give it one of these suffixes.")
     if modes and path.suffix in (".data", ".csv"):
         raise BadInputError(f"-o {path}: it has no room for modes; leave --mode out, or export .vtp or .xyz.")
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ...packing.contacts import Contacts
 from ...packing.geometry import nearest_image, touching
 from ...packing.packing import Packing
 from ...responses.hysteresis import turning_points
+from ..atomic_write import FORMAT_KEY, check_format
 from ..runfile import RunFile, law_parameters
 from .disks import Slips
 
@@ -173,20 +175,29 @@ def _eigenvalues(modes: Sequence[ModeVectors]) -> dict[str, float]:
     return {f"{mode.name}{name}": float(part(mode.eigenvalue)) for mode in modes for name, part in parts}
 
 
-def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """The values of `PARAMETER_NAMES` in a mapping, as far as these are numbers."""
-    found = {}
+def read_back(
+    path: Path, values: Mapping[str, Any], rows: Sequence[float] | Floats | None, low: bool
+) -> dict[str, Any]:
+    """Fields `given` and `slips` of Disks, of the numbers and the `Exported.rows` in a file, which may be another's.
+
+    Parameters
+    ----------
+    values : mapping
+        What the file has by name, law and load among these.
+    low : bool
+        Whether rows have low parts of slips.
+    """
+    check_format(values.get(FORMAT_KEY), path)
+    given = {}
     for key in PARAMETER_NAMES & values.keys():
         with suppress(TypeError, ValueError):
-            found[key] = float(values[key])
-    return found
-
-
-def slips_of(numbers: Sequence[float] | Floats, compensated: bool) -> Slips:
-    """The slips of `Exported.rows`, of its numbers in a row."""
-    rows = np.reshape(np.asarray(numbers, dtype=np.float64), (-1, 4 if compensated else 3))
-    first, second = rows[:, :2].T.astype(np.int64)
-    return Slips(first, second, rows[:, 2], rows[:, 3] if compensated else None, complete=True)
+            given[key] = float(values[key])
+    if rows is None:
+        return {"given": given}
+    columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
+    first, second = columns[:2].astype(np.int64)
+    slips = Slips(first, second, columns[2], columns[3] if low else None, complete=True)
+    return {"given": given, "slips": slips}
 
 
 def _in_space(vectors: Floats) -> Floats:

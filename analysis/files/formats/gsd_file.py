@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, open_plain, replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, open_plain, replace_whole
 from .disks import Disks, choose_frame, particles_of
-from .exported import Exported, pick_numbers, slips_of
+from .exported import Exported, read_back
 
 OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
 OWN_QUANTITIES = "particles/faultgouge/"
@@ -46,12 +46,10 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
-        period, number, rows = values.get("box_length"), values.get(FORMAT_KEY), log.get(CONTACTS)
-        check_format(None if number is None else int(number), path)
+        period, rows = values.get("box_length"), log.get(CONTACTS)
         edges = None if period is None else np.diag([float(period), 1.0, 1.0])
-        slips = None if rows is None else slips_of(rows[rows[:, 0] > 0], "x_low" in columns)
-        given = pick_numbers(values)
-        return particles_of(path, columns, edges, type_names=type_names, given=given, slips=slips)
+        more = read_back(path, values, None if rows is None else rows[rows[:, 0] > 0], "x_low" in columns)
+        return particles_of(path, columns, edges, type_names=type_names, **more)
     if particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
     given = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}

@@ -20,9 +20,9 @@ import numpy as np
 
 from ...errors import PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, write_text
+from ..atomic_write import FORMAT, FORMAT_KEY, write_text
 from .disks import Disks, particles_of, sphere_volume
-from .exported import Exported, pick_numbers, slips_of
+from .exported import Exported, read_back
 from .tables import columns_of, lines_of, numbers_in, strip_comments
 
 HEADER_COMMENT = "# faultgouge"
@@ -58,10 +58,9 @@ def read_data(path: Path) -> Disks:
         columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
         columns["top"] = columns["type"] - 1
         values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
-        check_format(values.get(FORMAT_KEY), path)
         contacts = [line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)]
-        more = {"periodic": (values.get("sides") == "p", False, False), "given": pick_numbers(values)}
-        more["slips"] = slips_of(numbers_in(" ".join(contacts), path), "x_low" in columns)
+        more = read_back(path, values, numbers_in(" ".join(contacts), path), "x_low" in columns)
+        more["periodic"] = (values.get("sides") == "p", False, False)
     return particles_of(path, columns, box, origin=low, **more)
 
 

@@ -213,6 +213,5 @@ def _numbers_in(path: Path) -> dict[str, float]:
     with telling(path, "must have one key and one number a line", ValueError):
         lines = (line.split() for line in read_plain_text(path).splitlines() if line.strip())
         found = {key: float(value) for key, value in lines}
-    number = found.pop(FORMAT_KEY, None)
-    check_format(None if number is None else f"{number:g}", path)
+    check_format(found.pop(FORMAT_KEY, None), path)
     return found

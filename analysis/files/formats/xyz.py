@@ -9,14 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, replace_whole
 from .disks import Disks, particles_of
-from .exported import Exported, pick_numbers, slips_of
+from .exported import Exported, read_back
 from .tables import block_of_frame, columns_of, lines_of, numbers_in
 
 PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
@@ -28,7 +27,6 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 2, frame)
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
-    check_format(values.get(FORMAT_KEY), path)
     words = values.get("Properties", "").lower().split(":")
     if len(words) < 3:
         where = f"{path}, line {begin + 2}"
@@ -47,10 +45,8 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     box = np.reshape(lattice, (3, 3)) if len(lattice) == 9 else None
     origin = numbers_in(values.get("Origin", "0 0 0"), path)
     sides = [each in ("T", "1", "True") for each in values.get("pbc", "T T T").split()]
-    slips = None if listed is None else slips_of(numbers_in(listed, path), "x_low" in columns)
-    given = pick_numbers(values)
-    more: dict[str, Any] = {"origin": np.array(origin), "periodic": sides, "given": given, "slips": slips}
-    return particles_of(path, columns, box, type_names=species, **more)
+    more = read_back(path, values, None if listed is None else numbers_in(listed, path), "x_low" in columns)
+    return particles_of(path, columns, box, type_names=species, origin=np.array(origin), periodic=sides, **more)
 
 
 def write_xyz(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:

@@ -12,7 +12,7 @@ from typer import Argument, Option
 
 from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
-from .packings import verdict_of
+from .packings import MaterialOf, verdict_of
 from .pictures import modes_of
 from .terminal import (
     RAMPED,
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON; of YADE and MercuryDPM."
 OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
 OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
-OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
 OF_BALANCE = "Of a deck: force that may be out of balance, as a share of the mean contact force; 1e-4 by default."
 OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
 OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
@@ -56,7 +55,7 @@ def import_(
     contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
     frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
-    material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
+    material: MaterialOf = None,
     columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:

@@ -126,12 +126,10 @@ def _in_words(found: Onset) -> Results:
         return
     yield f"{mu}: {found.describe()}"
     if found.complete:
-        ends = ["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]
-        rows = [
-            (with_uncertainty(each.fx_onset, each.error), end, f"{each.eigenvalue:.6g}", each.kind)
-            for each, end in zip(found.windows, ends, strict=True)
-        ]
-        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), rows)
+        columns = [[with_uncertainty(each.fx_onset, each.error) for each in found.windows]]
+        columns += [["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]]
+        columns += [[f"{each.eigenvalue:.6g}" for each in found.windows], [each.kind for each in found.windows]]
+        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), zip(*columns, strict=True))
     elif opening.kind != "start":
         how = "two eigenvalues merge" if opening.kind == "coalescence" else "contacts change"
         yield f"{mu}: {how} there, and become complex about {opening.eigenvalue:.6g} ({opening.kind})"

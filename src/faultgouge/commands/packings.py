@@ -54,14 +54,13 @@ OF_ANY = "run.h5, NAME.disks, a LAMMPS deck; or, with --material, a table of sph
 AnyPacking = Annotated[Path, Argument(metavar="FILE", help=OF_ANY, callback=refuse_scene)]
 OF_TABLE = "Of a table: young, poisson, density, friction, restitution; or kn, kt and exponent (1.5 or 1) for young."
 MaterialOf = Annotated[str | None, Option("--material", metavar="KEY=VALUE,...", help=OF_TABLE)]
-OF_TIME = "How long motion is followed; until it has settled by default."
 
 
 @command("faultgouge examples pour && faultgouge stability pour.in --follow", as_json=True)
 def stability(
     file: Annotated[Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a deck (.in).")] = None,
     rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE, callback=one_of("fx"))] = None,
-    followed: Annotated[float | None, Option("--time", metavar="T", help=OF_TIME)] = None,
+    followed: Annotated[float | None, Option("--time", metavar="T", help="How long motion is followed.")] = None,
     follow: Follow = False,
     relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,

@@ -49,11 +49,11 @@ def examples(
 
     scenes = files("faultgouge") / "scenes"
     shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
-    # what an example shows, and the command that runs it: its first two lines
-    heads = {key: [line.strip('# "') for line in each.read_text().splitlines()[:2]] for key, each in shelf.items()}
     if name is None:
-        for key in sorted(shelf):
-            yield "{:9} {}\n{:9} {}".format(key, heads[key][0], "", heads[key][1])
+        for key, each in sorted(shelf.items()):  # its first two lines: what it shows, and the command that runs it
+            yield "{0:9} {2}\n{1:9} {3}".format(
+                key, "", *(line.strip('# "') for line in each.read_text().splitlines()[:2])
+            )
         yield "\nfaultgouge examples NAME copies one into this folder."
         return
     # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
@@ -73,15 +73,11 @@ def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    with Record(output, scene, saved=_keeps) as record:
+    with Record(output, scene, saved=keeps) as record:
         last = _settle_or_read(scene, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     yield f"{last}; written to {output}"
-
-
-def _keeps(words: str, path: Path) -> None:
-    keeps(words)
 
 
 def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
@@ -112,7 +108,7 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
 
     assert scene.ramp is not None
     loads = all_loads(scene.ramp)
-    with Record(output, scene, saved=_keeps) as record:
+    with Record(output, scene, saved=keeps) as record:
         start = _settle_or_read(scene, record)
         done = count_behind(scene.ramp, record.forces)
         dumps = output.with_suffix("") if scene.output is not None and scene.output.dumps else None
@@ -167,7 +163,7 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     assert settings is not None
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
-    with Record(output, scene, task="perturb", saved=_keeps) as record:
+    with Record(output, scene, task="perturb", saved=keeps) as record:
         if (start := record.last) is None:
             if (fx := settings.fx) is None:
                 fx = load_at_onset(scene)
@@ -260,7 +256,7 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
     from faultgouge.pywrap import Equilibrium, Record
     from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
 
-    with Record(output, scene, task="drive", saved=_keeps) as record:
+    with Record(output, scene, task="drive", saved=keeps) as record:
         if record.last is None:
             if start is None:
                 with status("settling") as show:
