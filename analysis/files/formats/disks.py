@@ -350,9 +350,8 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
     except (OSError, ValueError) as error:
         raise BadInputError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
-        y, source = disks.position[:, 1], disks.source
-        layer = f"{source}: its own column top" if says is None else f"{key}{text}: this layer of {source}"
-        raise BadInputError(f"{layer} holds no disk; they go from y = {y.min():g} to {y.max():g}.")
+        y, layer = disks.position[:, 1], "its own column top" if says is None else f"{key}{text}"
+        raise BadInputError(f"{disks.source}: {layer} holds no disk; they go from y = {y.min():g} to {y.max():g}.")
     return chosen
 
 
