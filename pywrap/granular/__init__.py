@@ -1,10 +1,9 @@
 """A LAMMPS of one's own: any packing of its granular styles, as it stands.
 
-- `granular_commands`: the commands of a deck that concern contacts; `contact_law_measurement`: the laws of these
-  contacts, measured in a second LAMMPS
+- `granular_commands`: the commands of a deck that concern contacts, and which coordinates they move;
+  `contact_law_measurement`: the laws of these contacts, measured in a second LAMMPS
 - `look_in_a_copy`: the instance and its log, in a copy of the process; `lammps_arrays`: an instance in numbers;
   `looks`: all numbers of one look, and whether forces follow the time
-- `mobility`: which coordinates move, bodies among them
 - `configuration_by_laws`: a Configuration with the measured laws; `configuration_by_differences`: one with K and C by
   differences of LAMMPS's forces
 - `balance`: whether a packing rests

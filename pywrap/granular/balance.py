@@ -49,8 +49,8 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
     advice = known_cause(commands, configuration.contacts, size) or (
-        "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
-        "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
+        "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous), or "
+        "allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise NotTakenError(
         f"The packing moves: the residual of {who} is "
@@ -89,8 +89,7 @@ def motion_remarks(
 LOST = (
     "have no tangential force, as where histories are lost: a wall or a pair style that is defined anew has none yet; "
     "write_restart, rerun, reset_atoms, and delete_atoms without `compress no`, lose them after the last run; and "
-    "LAMMPS reads none from a restart file if another instance of a granular style was there before in the process, "
-    "and not all across a periodic boundary or with newton off; run on with drag (fix viscous) until the packing rests"
+    "LAMMPS reads none if another granular instance was there before in the process; run on with drag until it rests"
 )
 
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"

@@ -43,11 +43,10 @@ from ...analysis.arrays import Floats, Indices, derive_frozen
 from ..lammps.instance import load_plugin
 from .balance import force_scale
 from .configuration_by_laws import contacts_of_pairs
-from .granular_commands import BODIES, HOLDS, OWN, Commands, NotTakenError, without_suffix
+from .granular_commands import BODIES, HOLDS, OWN, Commands, NotTakenError, translating_bodies, without_suffix
 from .lammps_arrays import on_coordinates, owned_array, rows_of, set_velocity
 from .look_in_a_copy import in_a_copy, open_files, quieten, styles_of
 from .looks import Arrays, Looked, box_of, hold_still, look, particles_of
-from .mobility import translating_bodies
 
 LENGTH_OF_STEP = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
@@ -169,8 +168,7 @@ def _measure(lmp: Any, c: Configuration, constraint: csr_array, lines: dict[str,
             f"K and C by differences of forces are {unexplained[worst]:.2g} of their largest entry from the forces of "
             f"a displacement of all particles at particle {c.ids[worst]} at ({there})"
             f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, "
-            "or lie between both planes of one fix wall/gran (write a fix for each), or something couples particles "
-            "that are no neighbours; run on with drag under a load that presses them together."
+            "or something couples particles that are no neighbours; run on with drag under a load that presses them."
         )
     given = {"stiffness": stiffness.matrix, "damping": damping.matrix}
     return given | {"operator_error": float(both.error.max()), "jump": both.jump}

@@ -85,10 +85,7 @@ def configuration_by_laws(lmp: Any, looked: Looked, laws: KnownLaws) -> Configur
         says = "The torques on particles are not those of their contacts"
         if known := known_cause(commands, contacts):
             raise NotTakenError(f"{says}: {known}.")
-        raise NotLinearisedError(
-            f"{says}: something else turns them, or this release of LAMMPS hands out contacts in another way than "
-            "those of 29 Aug 2024 to 22 Jul 2025."
-        )
+        raise NotLinearisedError(f"{says}: something else turns them, or this LAMMPS hands out contacts otherwise.")
     return derive_frozen(made, load=load)
 
 

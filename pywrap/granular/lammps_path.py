@@ -137,10 +137,7 @@ class CopiesSolver:
         here, found = _ask(self._process_of(below), load)
         if isinstance(found, FaultgougeError):
             here.close()
-            try:
-                raise found
-            finally:
-                del found  # its traceback has this frame, and so this solver
+            raise found
         made = RelaxedCopy(found, here)
         if ahead:
             self._ahead.append(made)

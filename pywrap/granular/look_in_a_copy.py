@@ -47,10 +47,8 @@ def require_instance(lmp: Any, caller: str) -> None:
     if getattr(lmp, "lmp", None) is None:
         raise NotTakenError(f"{caller} takes an open instance, and this one is closed: call {caller} before close().")
     if MPI.COMM_WORLD.size > 1 or lmp.extract_setting("nthreads") > 1 or not hasattr(os, "fork"):
-        raise NotTakenError(
-            f"{caller} looks at LAMMPS in a copy of the process, which several ranks or threads cannot have: use one "
-            "rank and one thread, as by a restart file that the run has written."
-        )
+        why = "looks at LAMMPS in a copy of the process, which several ranks or threads cannot have"
+        raise NotTakenError(f"{caller} {why}: use one rank and one thread, as by a restart file of the run.")
 
 
 class Styles(NamedTuple):

@@ -22,11 +22,14 @@ from .granular_commands import (
     OWN,
     WALLS,
     Commands,
+    Mobility,
     NotLinearisedError,
     NotTakenError,
     check_fixes,
+    mobility,
     read_commands,
     rolls,
+    translating_bodies,
     unmeasured_pair,
     without_suffix,
 )
@@ -42,7 +45,6 @@ from .look_in_a_copy import (
     styles_of,
     text_of,
 )
-from .mobility import Mobility, mobility, translating_bodies
 
 Arrays = dict[str, Any]
 
@@ -127,11 +129,8 @@ def look(lmp: Any, given: Commands | None, files: dict[int, OpenFile], *, whole:
     walls = [each for name, each in found.items() if name.startswith("wall ")]
     forces = np.concatenate([each.ravel() for each in (found["f"], found["contacts"][:, 3:4], *walls)])
     if change > FOLLOWS_TIME * np.abs(forces).max():
-        variable = (
-            "a load, a wall or a region follows a variable of the step or the time; give it a constant before the last "
-            "run, and run on until the packing rests"
-        )
-        says = TWICE if touch_twice(*found["partners"].T) else variable
+        variable = "a load, a wall or a region follows a variable of the step or the time; give it a constant"
+        says = TWICE if touch_twice(*found["partners"].T) else f"{variable}, and run on until the packing rests"
         raise NotTakenError(f"LAMMPS's forces change with the time, though nothing moves: {says}.")
     members = {name: found[f"group {name}"] for name in groups}
     lines = {name: line for name, line in given.fixes.items() if plain.get(name) in MOBILE}

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable_timestep
+from ...analysis import Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .balance import check_balance, force_scale, keeps_moving, motion_remarks
@@ -82,7 +82,7 @@ def relax(
     NotTakenError
         If the instance cannot be taken, as by `from_lammps`.
     BadInputError
-        If `balance` or `steps` is no such number.
+        If `balance` is no such number.
     NoEquilibriumError
         If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
 
@@ -96,8 +96,6 @@ def relax(
     True
     """
     check_balance(balance)
-    if steps < 1:
-        raise BadInputError(f"steps = {steps} is refused: nothing would come to rest; give a number from 1 on.")
     require_instance(lmp, "relax")
     lines = None if commands is None else read_commands(commands)
 
@@ -231,8 +229,7 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     lost = count - lmp.extract_setting("nlocal")
     if lost:
         raise NoEquilibriumError(
-            f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete those that fall "
-            "outside of the walls, or take a box with walls or periodic edges."
+            f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete it, or take walls."
         )
 
 

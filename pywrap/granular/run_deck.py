@@ -49,10 +49,7 @@ BEFORE_RUNS = ctypes.CFUNCTYPE(None)(lambda: None)
 QUIT = "faultgouge: the deck ends by quit"
 """What LAMMPS stops with where a deck quits (`deck_watch.cpp`)."""
 
-LIGGGHTS = (
-    "hard_particles", "atom_style granular", "gran model", "property/global", "particletemplate", "mesh/surface",
-    "insert/",
-)  # fmt: skip
+LIGGGHTS = ("hard_particles", "atom_style granular", "gran model", "property/global", "mesh/surface", "insert/")
 """Words of LIGGGHTS's commands that LAMMPS does not have."""
 
 WRITERS = ("print", "ave/", "record")

@@ -143,13 +143,15 @@ def test_a_deck_without_particles(faultgouge_here, tmp_path):
 
 
 @pytest.mark.ranks
-def test_what_is_taken_on_one_rank_alone(faultgouge, faultgouge_here, tmp_path):
-    """A look needs a copy of the process. What several ranks have run is kept, and taken on one."""
+def test_a_deck_on_two_ranks(faultgouge, faultgouge_here, tmp_path):
+    """A look needs a copy of the process. What several ranks have run is taken by a process of one, a step on."""
     (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word=""))
-    said = faultgouge("import", "pile.in", "-o", "pile.h5", ranks=2, code=1).stderr
-    assert "which several ranks or threads cannot have: use one rank and one thread" in said
-    assert "The state, one step on, is kept in pile.restart, and the deck pile.restart.in" in said
-    assert "3 spheres, " in faultgouge_here("import", "pile.restart", "--relax", "-o", "pile.h5").stdout
+    assert "3 spheres, " in faultgouge("import", "pile.in", "-o", "two.h5", ranks=2).stdout
+    faultgouge_here("import", "pile.in", "-o", "one.h5")
+    two, one = (read_configuration(tmp_path / f"{name}.h5") for name in ("two", "one"))
+    assert two.position == pytest.approx(one.position, abs=1e-9)
+    assert two.contacts.tangential_force == pytest.approx(one.contacts.tangential_force, abs=1e-7)
+    assert "one step after the end of the deck on 2 ranks" in two.remarks[-1]
 
 
 def test_regions_that_move(faultgouge_here, tmp_path):
