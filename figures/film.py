@@ -163,8 +163,10 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
             picture.putpalette(colours.ravel().tolist())
             yield picture
 
-    first, *others = pictures()
-    first.save(path, "GIF", save_all=True, append_images=others, duration=round(1000 / rate), loop=0, optimize=True)
+    frames = iter(pictures())
+    next(frames).save(
+        path, "GIF", save_all=True, append_images=frames, duration=round(1000 / rate), loop=0, optimize=True
+    )
 
 
 def _ffmpeg() -> Any:

@@ -15,7 +15,8 @@ balances the forces better is taken.
 **What they tell.** Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come
 from the small asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions
 without stiffness, and in how many draws of the forces from their errors the linearised packing is unstable. A load on
-each disk balances each such packing, and no motion of a real packing or of LAMMPS's is beside these verdicts.
+each disk balances each such packing, and no motion of a real packing or of LAMMPS's is beside these verdicts. The error
+of f_n is read off the two sides of the contacts. A table whose sides are equal, or that has one, does not tell it.
 """
 
 from __future__ import annotations
@@ -36,9 +37,6 @@ from ..motion.stability import stability
 from ..operators.stiffness import stiffness_matrix
 from .atomic_write import telling
 from .formats.disks import choose_frame
-
-USUAL_ERROR = 1 / 6
-"""Error of f_n where the table has one row, or two equal ones, for a contact: the median of photoelastic tables."""
 
 DRAWN_FORCES = 10
 """Draws of the forces: a chance of one half is then known within a third."""
@@ -65,7 +63,7 @@ def _rows(path: Path, *widths: int) -> Floats:
 
 
 def measured_forces(
-    particles: Path, contacts: Path, material: Material, frame: int = -1, draws: int = DRAWN_FORCES
+    particles: Path, contacts: Path, material: Material, frame: int = -1, error: float | None = None
 ) -> tuple[Configuration, list[str]]:
     """A packing with measured contact forces, and what can be said of it.
 
@@ -73,6 +71,8 @@ def measured_forces(
     ----------
     frame : int
         Which of the steps of the table of contacts, in their order.
+    error : float, optional
+        Error of f_n, relative; by default what the two sides of the contacts say, if they differ.
 
     Returns
     -------
@@ -103,7 +103,8 @@ def measured_forces(
     ft, fn = (np.bincount(place, rows[:, k], len(pairs)) / count for k in (3, 4))
     differ = np.abs(rows[:, 4] - fn[place]) / np.maximum(fn[place], np.finfo(float).tiny)
     twice = differ[(count[place] > 1) & (differ > 0)]
-    error = 2 * float(np.median(twice)) if len(twice) else USUAL_ERROR
+    if error is None and len(twice):
+        error = 2 * float(np.median(twice))
     (i, j), fn, ft = pairs[fn > 0].T, fn[fn > 0], ft[fn > 0]
     centre, radius = disks[:, 1:3], disks[:, 3]
     branch = np.pad(centre[i] - centre[j], ((0, 0), (0, 1)))
@@ -127,11 +128,18 @@ def measured_forces(
     found, other = packing(fn, ft), packing(fn, -ft)
     if inside.any() and imbalance(other).mean() < imbalance(found).mean():
         found, ft = other, -ft
-    rng, seen = np.random.default_rng(0), []
-    for _ in range(draws):
-        drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
-        seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
-    unknown = f", and {seen.count(None)} not known" if None in seen else ""
+    if error is None:
+        chance = "the table has one f_n for a contact, not one from either side: its error, and a chance, are not known"
+    else:
+        rng, seen = np.random.default_rng(0), []
+        for _ in range(DRAWN_FORCES):
+            drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
+            seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
+        unknown = f", and {seen.count(None)} not known" if None in seen else ""
+        chance = (
+            f"unstable in {seen.count(False)} of {DRAWN_FORCES} draws of the forces within an error of f_n of "
+            f"{error:.2g}{unknown}, if a load on each disk balanced the forces drawn"
+        )
     left_out = f"; {counted(int(walls.sum()), 'row')} of walls left out, whose place no file has" if walls.any() else ""
     # motions of the disks in contact that stretch no spring, without translations and rotation as a whole
     c, none = found.contacts, np.zeros_like(found.contacts.normal)
@@ -146,10 +154,9 @@ def measured_forces(
     says = [
         f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {int(c.at_bound.sum())} at "
         f"Coulomb's bound; forces on a disk are out of balance by {lacks:.2g} of its "
-        f"mean contact force (median), and f_n is taken with an error of {error:.2g}{left_out}",
+        f"mean contact force (median){left_out}",
         f"{floppy} motions without stiffness beside those of a free body, if contacts at the bound slide",
-        f"unstable in {seen.count(False)} of {draws} draws of the forces within this error{unknown}, if a load on "
-        "each disk balanced the forces drawn",
+        chance,
         NO_RATE,
     ]
     return derive_frozen(found, slips_known=False, remarks=tuple(says)), says

@@ -54,8 +54,6 @@ def test_deck(faultgouge_here, tmp_path, shape):
         assert "15 modes, counted from 0" in too_large
         return
     assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
-    assert "no slips" in faultgouge_here("draw", "pile.h5", "--color", "slip", code=2).stderr
-    faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.2", "-o", "mode.gif")
 
 
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"

@@ -65,9 +65,9 @@ def test_a_seed_is_one_packing_over_loads():
 def test_other_increments_lead_to_the_same_packing(monkeypatch):
     bed = settle_bed(scene())
     bed = replace(bed, law=replace(bed.law, mu=0.0))
-    found = change_load(bed, 6.0)
+    found = change_load(bed, 4.5)
     monkeypatch.setattr("faultgouge.pywrap.settling.change_load.LOAD_FACTOR", 1.02)
-    assert farthest(change_load(bed, 6.0), found) < 1e-11  # rounding of coordinates, over soft modes
+    assert farthest(change_load(bed, 4.5), found) < 1e-11  # rounding of coordinates, over soft modes
 
 
 @pytest.mark.slow

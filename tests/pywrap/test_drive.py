@@ -176,7 +176,7 @@ SLIPS = {
     "law": {"kn": 2e5},
     "load": {"fy": 3.0},
     "damping": {"cn": 60.0, "ct": 17.0},
-    "drive": {"spring": 10.0, "velocity": 2e-3, "slips": 2},
+    "drive": {"spring": 10.0, "velocity": 2e-3, "slips": 1},
 }
 
 
@@ -195,7 +195,7 @@ def test_states_are_the_even_ones_and_both_ends_of_each_slip_wherever_the_run_is
     slips = [step.slip for step in steps if step.slip]
     ends = {time for slip in slips for time in (slip.begins, slip.ends)}
     even = {rows[count - 1].time for count, _ in kept}
-    assert len(slips) == 2
+    assert len(slips) == 1
     assert [time for time, _ in states] == sorted(even | ends | {rows[-1].time})
     samples = {row.time: row for row in rows}
     for packing, row in ((state.packing, samples[state.time]) for step in steps for state in step.states):
@@ -229,7 +229,7 @@ def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says
 @pytest.mark.ranks
 @pytest.mark.slow
 def test_command_on_two_ranks_is_the_same_to_the_bit(scene, faultgouge, faultgouge_here, tmp_path):
-    drive = {"spring": 10.0, "velocity": 5e-3, "until": 0.6, "states": 0.2}
+    drive = {"spring": 10.0, "velocity": 5e-3, "until": 0.3, "states": 0.1}
     wanted = BASE | {"packing": {"file": str(scene(**THROWN).packing.file)}, "damping": {"cn": 60.0}, "drive": drive}
     (tmp_path / "scene.toml").write_text(toml(wanted))
     results = []

@@ -37,8 +37,6 @@ The coefficient of friction is 3, so that no contact comes to rest at Coulomb's 
 hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
 
 RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
-SMOOTH = {kind: f"3e3 9e2 0.5{{}} history {kind} damping 40 40" for kind in ("total", "rescaled", "coulomb")}
-"""What follows the name of mindlin/smooth, for pairs and, with a floor, for the fix."""
 ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
@@ -138,16 +136,13 @@ neigh_modify every 1 delay 0 check yes
 
 
 def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str = "3.0") -> None:
-    own = {name: (f"mindlin/smooth {words.format('')}", ["* *"], "") for name, words in SMOOTH.items()}
-    style, coefficients, wall = (LAWS | own)[law]
+    style, coefficients, wall = LAWS[law]
     style, wall, *coefficients = (each.replace(" 3.0", f" {mu}") for each in (style, wall, *coefficients))
     lmp.command(f"pair_style {style.format(g=g)}")
     for each in coefficients:
         lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
     plane = "zplane" if d == 3 else "yplane"
-    if law in SMOOTH:
-        lmp.command(f"fix floor all wall/mindlin/smooth {SMOOTH[law].format(' ylo 0')}")
-    elif w:
+    if w:
         lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
 
 
@@ -157,13 +152,10 @@ def of_particle(lmp, name: str, number: int) -> np.ndarray:
     return lmp.numpy.extract_atom(name)[row]
 
 
-def state(lmp, world=None) -> np.ndarray:
-    """All that moves, in the order of the IDs, of one rank or of all."""
+def state(lmp) -> np.ndarray:
+    """All that moves, in the order of the IDs."""
     count = lmp.extract_setting("nlocal")
     names = ("x", "v", "omega", "f", "torque")
-    rows = np.zeros((0, 16))
-    if count:
-        ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
-        rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
-    every = rows if world is None else np.concatenate(world.allgather(rows))
-    return every[np.argsort(every[:, 0])]
+    ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
+    rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
+    return rows[np.argsort(rows[:, 0])]

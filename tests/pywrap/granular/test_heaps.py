@@ -57,9 +57,9 @@ run 20000 post no
 
 
 HEAPS = {
-    "rests": ("mindlin_rescale/force", 0.1, True, 1, 40),
+    "rests": ("mindlin_rescale/force", 0.1, True, 1, 20),
     "rolls at the bound": ("mindlin_rescale/force", 0.02, True, 1, 30),
-    "rests without dashpots": ("mindlin_rescale/force", 0.1, False, 2, 40),
+    "rests without dashpots": ("mindlin_rescale/force", 0.1, False, 2, 20),
     "grows": ("mindlin_rescale", 0.1, False, 5, 50),
 }
 
@@ -92,7 +92,7 @@ def test_k_and_c_are_those_of_forces(heap):
     """K and C by laws beside differences of LAMMPS's forces, which know nothing of rolling."""
     from faultgouge.pywrap import from_lammps
 
-    lmp = heap("mindlin/force", 0.1, True, 1, 30)
+    lmp = heap("mindlin/force", 0.1, True, 1, 15)
     laws, differences = (from_lammps(lmp, differences=each) for each in (False, True))
     assert len(laws.contact_columns()["mobilised"]) == len(differences.contacts) + laws.contacts.touching.wall.sum()
     assert not len(differences.one_sided_particles)
