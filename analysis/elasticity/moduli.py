@@ -369,7 +369,7 @@ class QuietResponse:
         self.matrix = matrix
         self.factors = general_lu(csc_array(matrix + diags_array(np.full(len(mass), self.held))))
 
-    def solve(self, force: Complexes, refinements: int = CORRECTIONS) -> Complexes:
+    def solve(self, force: Floats | Complexes, refinements: int = CORRECTIONS) -> Complexes:
         """q of (K + i omega C - omega^2 M) q = F, shape (coordinates, n)."""
         moved = self.factors.solve(force)
         for _ in range(refinements):

@@ -128,16 +128,16 @@ def vibrations(packing: HasConfiguration, moments: int | None = None, vectors: i
     """
     configuration = packing.configuration
     scale = 1.0 / np.sqrt(configuration.coordinate_mass)
-    weighted = [
+    a, g = (
         csr_array(diags_array(scale) @ each @ diags_array(scale))
         for each in (stiffness_matrix(configuration), damping_matrix(configuration))
-    ]
-    if not weighted[0].nnz:
+    )
+    if not a.nnz:
         raise BadInputError("Nothing vibrates: no particle touches another.")
     moments = moments or min(MOMENTS, max(64, configuration.coordinates // 8))
     if configuration.coordinates <= ALL_MODES:
-        return _of_all_modes(configuration, *weighted, moments)
-    return _of_vectors(configuration, *weighted, moments, vectors)
+        return _of_all_modes(configuration, a, g, moments)
+    return _of_vectors(configuration, a, g, moments, vectors)
 
 
 def _of_all_modes(c: Configuration, a: csr_array, g: csr_array, moments: int) -> Vibrations:
@@ -316,7 +316,7 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
             if step % every == 0:
                 samples.append(np.einsum("ik,ik->k", weighted, half))
         kept = np.mean((np.array(samples) / size).reshape(-1, d, 2), axis=2)
-        time = np.arange(len(kept)) * (every * limit)
+        time = np.asarray(np.arange(len(kept)) * (every * limit), dtype=float)
         for k in range(d):
             omega, gamma, misfit = _fit(time, np.ascontiguousarray(kept[:, k]), rough)
             # Verlet's own frequency of a motion is (2/dt) arcsin(omega dt/2)

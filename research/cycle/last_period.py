@@ -36,8 +36,7 @@ def rows_of(seed: int) -> Iterator[Row]:
     wanted = scene(seed, LAW)
     assert wanted.drive is not None
     start, series, packings = settle_for_drive(wanted), list[tuple[float, ...]](), list[Packing]()
-    draws = {"spring": wanted.drive.spring, "stages": wanted.drive.stages}
-    with Engine(start) as engine, engine.undamped(**draws) as dynamics:
+    with Engine(start) as engine, engine.undamped(spring=wanted.drive.spring, stages=wanted.drive.stages) as dynamics:
         dt, last = dynamics.time_step, 0
         part, every, total = steps_of(wanted.drive, start, dt)
         while last < total:

@@ -70,7 +70,7 @@ def windows_with(
 
     def system(fx: float) -> System:
         # numbers by name, of which mypy does not know which may be None
-        return System.of(path(fx).with_dissipation(**dissipation), dissipation=True)  # type: ignore[arg-type]
+        return System.of(path(fx).with_dissipation(**dissipation), dissipation=True)
 
     def between(below: float, above: float) -> list[float]:
         return [look] if look is not None and below < look < above else []
