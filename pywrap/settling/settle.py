@@ -149,8 +149,9 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
     length, radius = 2 * min(section.radii), section.start(draw).radius
     contacts = packing.contacts.slipped(length * packing.contacts.slip)
     box_length = None if packing.box_length is None else section.width
-    place = replace(packing, position=length * packing.position, radius=radius, mass=section.mass_of(radius))
-    found = replace(place, contacts=contacts, box_length=box_length, law=law, fy=scene.load.fy)
+    disks = replace(packing, box_length=None, position=length * packing.position, radius=radius)
+    place = replace(disks, mass=section.mass_of(radius), box_length=box_length)
+    found = replace(place, contacts=contacts, law=law, fy=scene.load.fy)
     return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
 
 

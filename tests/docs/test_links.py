@@ -73,7 +73,7 @@ def test_links_lead_somewhere_and_prose_fits_a_screen():
 
 
 def test_explanations_are_two_screens_with_a_picture_before_any_number():
-    assert (ROOT / "README.md").read_text().count("\n") <= 190  # three screens, with the table of other packages
+    assert (ROOT / "README.md").read_text().count("\n") <= 195  # three screens, with the table of other packages
     for page in EXPLANATIONS:
         text = (ROOT / "docs" / f"{page}.md").read_text()
         assert text.count("\n") <= 100, page
