@@ -78,9 +78,8 @@ def set_up(
     contact every 100 steps. `motion` is what `Engine.undamped` is given beside the time step.
     """
     # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
-    motion["time_step"] = float(
-        QUIET_SHARE * 0.2 / np.sqrt(12 * 10 * packing.fy / packing.law.overlap_of_force(10 * packing.fy))
-    )
+    most = 10 * packing.fy
+    motion["time_step"] = float(QUIET_SHARE * 0.2 / np.sqrt(12 * most / packing.law.overlap_of_force(most)))
     with temporary_folder() as folder, Engine(packing, MPI.COMM_SELF, log) as engine:
         if files == "dumps":
             engine.dump((log or Path(folder) / "log").with_name("run.1"))
@@ -113,7 +112,8 @@ def features(packing: Packing, motion: dict[str, Any]) -> Iterator[tuple[str, Ru
     yield "periodicity", (opened, {}), (closed, {})
     falls = {"weakening": motion.get("weakening", FALLS)}
     yield "dynamic friction", (of(law=rough), {}), (of(law=rough), falls)
-    rate, tau = np.sqrt(packing.fy / law.overlap_of_force(packing.fy) / packing.mass.mean()), packing.drag_time
+    stiffness = packing.fy / law.overlap_of_force(packing.fy)
+    rate, tau = np.sqrt(stiffness / packing.mass.mean()), packing.drag_time
     dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
     damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
     yield "dashpots", (of(law=replace(law, cn=0.0, ct=0.0)), {}), (of(law=damped), {})
