@@ -50,7 +50,10 @@ def onset(
         try:
             each = _search(scene, mu, not every, bed, folder)
             yield from _in_words(each)
-            found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | _in_si(scene, each))
+            for real in (si := _in_si(scene, each)).get("si", [])[:1]:
+                stress, ratio, frequency = (f"{number:.4g}" for number in real.values())
+                yield f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz"
+            found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | si)
         except (OnsetError, NoEquilibriumError) as error:
             failed = error
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
