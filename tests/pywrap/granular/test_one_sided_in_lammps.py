@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, instance, start, with_law
+from granular_packings import command, instance, start, with_law
 from pushes import PUSH, in_steps, pushed, velocities
 
 from faultgouge.analysis import one_sided_motion, stability
@@ -244,18 +244,50 @@ def test_motion_holds_up_to_the_push_that_is_said(growing):
 
 def bed_at_rest(log):
     """LAMMPS with a thousand spheres on a plane, ten deep, with a restitution of 0.8."""
-    lmp, rng, places, kinds = instance(log), np.random.default_rng(1), [], []
+    lmp, rng = instance(log), np.random.default_rng(1)
+    law = "hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji"
+    command(
+        lmp,
+        """
+units lj
+atom_style sphere
+atom_modify map array
+boundary p p f
+newton off
+comm_modify vel yes
+region box block 0 10.5 0 10.5 0 60 units box
+create_box 2 box
+neighbor 0.2 bin
+neigh_modify every 1 delay 0 check yes
+""",
+    )
     for k in range(1000):
         x, y = (np.array([k % 10, k // 10 % 10]) + 0.5) * 1.05 + rng.uniform(-0.1, 0.1, 2)
-        places.append((x, y, 0.6 + 1.05 * (k // 100) + rng.uniform(0, 0.02)))
-        kinds.append(rng.integers(1, 3))
-    law = "granular hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji"
-    rests = "fix drag all viscous 4.0\nfix spin all viscous/sphere 0.4\nrun 90000 post no\nunfix drag\nunfix spin"
-    command(lmp, deck(
-        places, law, "zplane 0 NULL contacts", box="block 0 10.5 0 10.5 0 60", boundary="p p f", kinds=kinds,
-        diameters=(0.8, 1.0), more="fix move all nve/sphere\nfix drag all viscous 0.5",
-        run=f"run 15000 post no\n{rests}\nrun 0 post no",
-    ))  # fmt: skip
+        height = 0.6 + 1.05 * (k // 100) + rng.uniform(0, 0.02)
+        lmp.command(f"create_atoms {rng.integers(1, 3)} single {x:.17g} {y:.17g} {height:.17g} units box")
+    command(
+        lmp,
+        f"""
+set type 1 diameter 0.8
+set type 2 diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {law}
+fix floor all wall/gran granular {law} zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-3
+thermo 1000000
+fix drag all viscous 0.5
+run 15000 post no
+fix drag all viscous 4.0
+fix spin all viscous/sphere 0.4
+run 90000 post no
+unfix drag
+unfix spin
+run 0 post no
+""",
+    )
     return lmp
 
 
