@@ -99,7 +99,7 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
         taken = set()
         for known in pairs:
             # followed from its last load, or else from the closest one
-            closest = min(known, key=lambda n, fx=packing.fx: abs(packings[n].fx - fx))  # type: ignore[misc]
+            closest = min(known, key=lambda n, fx=packing.fx: abs(packings[n].fx - fx))  # type: ignore[misc]  # binds the load of this turn
             images = (_image(modes, known[n]) for n in dict.fromkeys((max(known), closest)))
             members, plane = next((each for each in images if each), (None, None))
             if plane is not None and members not in taken:

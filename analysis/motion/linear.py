@@ -59,7 +59,7 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
     decides : bool
         Whether a verdict depends on this motion: otherwise fast growth alone is looked for in a large packing.
     time : float, optional
-        How long a random state is followed, where there is no certificate; three minutes of work by default.
+        How long a random state is followed, where there is no certificate; some ten minutes by default.
 
     Returns
     -------

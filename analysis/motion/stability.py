@@ -126,12 +126,12 @@ def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -
     if known is None:
         alone = Motion.of(c, dissipation=False) if damped else motion
         sticking = linear_verdict(alone, decides=not damped, time=time)
-        counts = {"pairs": None, "negative": None}
+        counts: dict[str, int | None] = {"pairs": None, "negative": None}
     else:
         roots = 1j * np.sqrt(known.unstable.astype(complex))
         s = complex(max(np.where(roots.real < 0, -roots, roots), key=np.real, default=0j))
         sticking = Linear(not len(roots), known.growth_rate(), 0.0, known.free, s)
-        counts = {"pairs": len(known.pairs), "negative": len(known.negative)}  # type: ignore[dict-item]
+        counts = {"pairs": len(known.pairs), "negative": len(known.negative)}
     rate = max(sticking.growth_rate, 0.0)
     undamped = FieldsByName(growth_rate=rate, **counts, at_least=sticking.at_least)
     return undamped, linear_verdict(motion, time=time) if damped else sticking

@@ -73,7 +73,7 @@ class GeneratedPacking(Section):
     radii: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False), LENGTH] = (0.5, 0.7)
     width: Annotated[Positive, LENGTH] = 11.9
     # the default becomes a number in the validator, which knows disks, radii and width
-    top: int = Field(None, gt=0)  # type: ignore[assignment]
+    top: int = Field(None, gt=0)  # type: ignore[assignment]  # see above
     seed: int = Field(7, ge=0, lt=2**63)
     periodic: bool = True
     settle_friction: bool = False

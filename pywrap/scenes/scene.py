@@ -242,6 +242,7 @@ class Scene(Section):
             alone = {key: model for key, model in others.items() if key in mapping}
             if wanted is not None and "perturb" not in wanted.reads and "perturb" in mapping:
                 alone["perturb"] = Inertia
+            # of keywords that are known at run time alone, which no overload has
             part = create_model("Part", **{key: (model, ...) for key, model in alone.items()})  # type: ignore[call-overload]
             found = dict(part.model_validate(mapping, context=context))
             context["inertia"] = found.pop("perturb", Inertia())

@@ -57,7 +57,7 @@ class Law(Section):
 
     kn: Annotated[Positive, STIFFNESS]
     # the default is of the form that a scene gives, and becomes a number in the validator
-    kt: Annotated[NotNegative, STIFFNESS] = Field("2/7 kn")  # type: ignore[assignment]
+    kt: Annotated[NotNegative, STIFFNESS] = Field("2/7 kn")  # type: ignore[assignment]  # see above
     mu: Annotated[NotNegative | Annotated[tuple[NotNegative, ...], LIST], rule("give one or more, of at least 0")] = 1.0
     exponent: float = 1.5
     history: Literal["total", "rescaled", "coulomb"] = "total"
