@@ -36,17 +36,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, eye_array
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, Indices, derive_frozen
 from ..lammps.instance import load_plugin
 from .balance import force_scale
 from .configuration_by_laws import contacts_of_pairs
-from .granular_commands import BODIES, HOLDS, OWN, Commands, NotTakenError, translating_bodies, without_suffix
+from .granular_commands import BODIES, HOLDS, OWN, Commands, NotTakenError, translating_bodies
 from .lammps_arrays import on_coordinates, owned_array, rows_of, set_velocity
 from .look_in_a_copy import in_a_copy, open_files, quieten, styles_of
-from .looks import Arrays, Looked, box_of, hold_still, look, particles_of
+from .looks import Arrays, Looked, hold_still, look, particles_of
 
 LENGTH_OF_STEP = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
@@ -84,7 +84,7 @@ displacements."""
 
 def configuration_by_differences(lmp: Any, still: Configuration, looked: Looked) -> Configuration:
     """The configuration with K and C, of particles as they stand."""
-    work = partial(_measure, lmp, still, looked.moved.constraint, looked.commands.fixes)
+    work = partial(_measure, lmp, still, looked.commands.fixes)
     return derive_frozen(still, **in_a_copy(work))
 
 
@@ -92,21 +92,21 @@ def still_particles(lmp: Any, given: Commands | None) -> tuple[Configuration, Lo
     """The particles of an instance as they stand, with empty K and C, and contacts of pairs that touch, with their
     forces as far as LAMMPS hands them out; and the look at it."""
     looked = in_a_copy(partial(look, lmp, given, open_files(), whole=True))
-    found, empty = looked.found, csr_array(looked.moved.constraint.shape)
+    found, fields = looked.found, particles_of(lmp, looked.found, looked.moved)
+    empty = csr_array(2 * (len(found["id"]) * (6 if fields["dimension"] == 3 else 3),))
     made = Configuration(
-        **particles_of(lmp, found, looked.moved), stiffness=empty, damping=empty, wall_force=found["at walls"],
-        contacts=_forces_of_pairs(found, box_of(lmp)[0], looked.commands.style),
+        **fields, stiffness=empty, damping=empty, wall_force=found["at walls"],
+        contacts=_forces_of_pairs(found, looked.commands.style),
     )  # fmt: skip
     total = np.stack([found["f"], found["torque"]], axis=1)
     return derive_frozen(made, load=np.where(made.free[:, None, None], total, 0.0) - made.contact_force), looked
 
 
-def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:
+def _forces_of_pairs(found: Arrays, style: str) -> LinearisedContacts:
     """Pairs that touch, with their forces alone: derivatives are zero, and no bound is known."""
-    pairs = contacts_of_pairs(found, box)
-    count, columns = pairs.forces.shape
-    forces, none, still = np.zeros((count, 4)), np.zeros(count), np.zeros((count, 3))
-    forces[:, :columns] = pairs.forces
+    pairs = contacts_of_pairs(found)
+    forces, count = pairs.forces, len(pairs.forces)
+    none, still = np.zeros(count), np.zeros((count, 3))
     along = np.abs(np.einsum("ca,ca->c", forces[:, 1:], pairs.geometry["normal"]))
     if np.any(along > 1e-6 * np.abs(forces).sum(axis=1)):  # rounding leaves 1e-10 of a tangential force
         forces[:, 1:] = 0.0  # this pair style hands out something else
@@ -119,9 +119,10 @@ def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContac
     return made.chosen(made.normal_force != 0)
 
 
-def _measure(lmp: Any, c: Configuration, constraint: csr_array, lines: dict[str, str]) -> dict[str, Any]:
+def _measure(lmp: Any, c: Configuration, lines: dict[str, str]) -> dict[str, Any]:
     """Fields of the configuration that concern K and C at rest, in a copy that may change; a NotTakenError if LAMMPS's
-    forces are not functions of displacements and velocities of neighbours. `constraint` is P of q = P Q."""
+    forces are not functions of displacements and velocities of neighbours."""
+    constraint = csr_array(diags_array(1.0 * c.coordinate_free)) if c.constraint is None else c.constraint
     lmp.command("log none")
     _hold_still(lmp, lines)
     rows, timestep = rows_of(lmp, c), float(lmp.extract_global("dt"))
@@ -178,7 +179,7 @@ def _hold_still(lmp: Any, lines: dict[str, str]) -> None:
     """Leave what exerts forces in a copy alone: no output, no drag, and nothing that moves or holds particles by
     itself; what has a velocity moves by it. Frozen particles, whose masses dashpots feel, stay. Histories are kept."""
     quieten(lmp, drag=True)
-    plain = {name: without_suffix(style) for name, style in styles_of(lmp).fixes.items()}
+    plain = styles_of(lmp).fixes
     hold_still(lmp, plain, lines)
     for name in [name for name, style in plain.items() if style in HOLDS and style != "freeze"]:
         lmp.command(f"unfix {name}")

@@ -18,7 +18,7 @@ from ...analysis.arrays import derive_frozen
 from .balance import BALANCE, check_balance, force_scale, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, without_suffix
+from .granular_commands import Commands, NotLinearisedError, NotTakenError, read_commands
 from .look_in_a_copy import DRAG_STYLES, in_a_copy, open_files, require_instance
 from .looks import Looked, acting_fixes, look, may_act
 from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError
@@ -148,11 +148,11 @@ def _at_rest(lmp: Any, made: Configuration, looked: Looked, *, balance: float, p
         if style.startswith("adapt"):
             says = "may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
             remarks.append(f"fix {name} (adapt) {says}")
-        elif without_suffix(style).startswith(DRAG_STYLES):
+        elif style.startswith(DRAG_STYLES):
             remarks.append(f"drag of fix {name} ({style}) is left out")
     refuse_motion(made, balance, looked.commands)
     made = derive_frozen(made, remarks=tuple(remarks))
     if not prove or made.residual > BALANCE * force_scale(made):
         return made
     others = may_act(acting_fixes(looked.fixes, looked.commands))
-    return derive_frozen(made, proof=prove_motion(lmp, made, others, extrapolates=looked.commands.style == OWN))
+    return derive_frozen(made, proof=prove_motion(lmp, made, others))

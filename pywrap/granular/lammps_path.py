@@ -233,7 +233,7 @@ def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
     if before := log_file(lmp, files):
         own = folder / f"log.{os.getpid()}"
-        shutil.copyfile(before.path, own)
+        shutil.copyfile(before[0], own)
         lmp.command(f'log "{own}" append')
 
 

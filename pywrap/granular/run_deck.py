@@ -32,7 +32,7 @@ from ..lammps.plain_file_names import shared_folder
 from .balance import BALANCE, check_balance
 from .from_lammps import from_lammps
 from .granular_commands import GIVE_LINES, NotTakenError, commands_of
-from .look_in_a_copy import INSERTS, explain_error, name_of, of_lammps, styles_of
+from .look_in_a_copy import INSERTS, explain_error, of_lammps, styles_of
 from .relax import relax
 
 WORLD = MPI.COMM_WORLD
@@ -172,7 +172,7 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
         plugin.faultgouge_watch(lmp.lmp, told, BEFORE_RUNS)
         try:
             with open(path.name, "rb") as stream:  # LAMMPS's bindings do not take any name
-                lmp.file(name_of(stream))
+                lmp.file(f"/dev/fd/{stream.fileno()}")
             complete = True
         except Exception as error:  # LAMMPS's bindings raise any error
             stopped = "" if QUIT in str(error) else explain_error(error)
