@@ -104,34 +104,31 @@ def _linearised_contacts(
 ) -> LinearisedContacts:
     """Contacts between particles, then those with each wall, then rolling friction. `mass` is what dashpots feel,
     infinite where frozen."""
-    pairs = contacts_of_pairs(found)
-    walls = [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
-    at_walls = {name: _contacts_of_wall(found, name, commands.fixes[name]) for name in walls}
-    parts, couples = [], []
-    if commands.style == OWN:
-        parts.append(_linearise_smooth(commands.pair[0].split()[2:], pairs))
-        for name, contacts in at_walls.items():
-            words = commands.fixes[name].split()
-            parts.append(_linearise_smooth(words[4:7] + words[9:], contacts))
-    else:
-        types = np.sort([found["type"][pairs.geometry["i"]], found["type"][pairs.geometry["j"]]], axis=0).T
-        groups: dict[Any, OneLaw] = {
-            (a, b): pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
-            for a, b in np.unique(types, axis=0).tolist()
-        }
-        for name, every in (groups | at_walls).items():
-            # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
-            touches = every.geometry["overlap"] > OVERLAP_ROUNDING * every.geometry["slip_arm"].sum(axis=1)
-            if not touches.any():
-                continue
-            group = every.chosen(touches, every.who)
-            # laws belong to commands, which a user may change
-            key = (*commands.pair, commands.fixes.get(name), name)
-            if key not in laws:
-                laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
-            sticks, rolls = _linearise_measured(laws[key], group, found, mass)
-            parts.append(sticks)
-            couples += [rolls] * (laws[key]["mu_rolling"] > 0)
+    pairs, parts, couples = contacts_of_pairs(found), [], []
+    types = np.sort([found["type"][pairs.geometry["i"]], found["type"][pairs.geometry["j"]]], axis=0).T
+    groups: dict[Any, OneLaw] = {
+        (a, b): pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
+        for a, b in np.unique(types, axis=0).tolist()
+    }
+    for name in [name.removeprefix("wall ") for name in found if name.startswith("wall ")]:
+        groups[name] = _contacts_of_wall(found, name, commands.fixes[name])
+    for name, every in groups.items():
+        if commands.style == OWN:
+            words = commands.fixes[name].split() if name in commands.fixes else commands.pair[0].split()
+            parts.append(_linearise_smooth(words[4:7] + words[9:] if name in commands.fixes else words[2:], every))
+            continue
+        # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
+        touches = every.geometry["overlap"] > OVERLAP_ROUNDING * every.geometry["slip_arm"].sum(axis=1)
+        if not touches.any():
+            continue
+        group = every.chosen(touches, every.who)
+        # laws belong to commands, which a user may change
+        key = (*commands.pair, commands.fixes.get(name), name)
+        if key not in laws:
+            laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
+        sticks, rolls = _linearise_measured(laws[key], group, found, mass)
+        parts.append(sticks)
+        couples += [rolls] * (laws[key]["mu_rolling"] > 0)
     values = {}
     for name, shape in PER_CONTACT.items():
         kind = bool if name in BOOLEAN else np.int64 if name in ("i", "j") else np.float64
@@ -229,7 +226,7 @@ def contacts_of_pairs(found: Arrays) -> OneLaw:
     distance = np.linalg.norm(branch, axis=1)
     overlap = found["radius"][i] + found["radius"][j] - distance
     geometry = _geometry(found, i, j, branch / distance[:, None], distance, overlap)
-    return OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:7], rows[:, 7:10])
+    return OneLaw("contacts of pairs", geometry, rows[:, 3:7], rows[:, 7:10])
 
 
 def _contacts_of_wall(found: Arrays, name: str, line: str) -> OneLaw:

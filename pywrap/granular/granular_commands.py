@@ -96,8 +96,15 @@ def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Co
     """
     if isinstance(lines, Commands):
         return lines
-    text = lines if isinstance(lines, str) else "\n".join(lines)
-    text = RUN.sub(r"\1", _without_prints(text)) if log else text
+    text = whole = lines if isinstance(lines, str) else "\n".join(lines)
+    if log:  # without the commands `print` and their output, which may read as a command, and without runs
+        text, at = "", 0
+        for each in PRINT.finditer(whole):
+            if each.start() >= at:
+                text, at = text + whole[at : each.start()], each.end()
+                for _ in range(0 if "screen no" in each["more"] else 1 + (each["text"] or "").count("\n")):
+                    at = whole.find("\n", at) + 1 or len(whole)
+        text = RUN.sub(r"\1", text + whole[at:])
     found = []
     for line in re.sub(r"&[ \t]*\n", " ", text).splitlines():
         words = line.split("#")[0].split()
@@ -107,17 +114,6 @@ def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Co
             raise NotTakenError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
         found.append(words)
     return commands_of(found, "The log of this LAMMPS has" if log else "The commands have")
-
-
-def _without_prints(text: str) -> str:
-    """A log without the commands `print` and their output, which may read as a command."""
-    kept, at = "", 0
-    for each in PRINT.finditer(text):
-        if each.start() >= at:
-            kept, at = kept + text[at : each.start()], each.end()
-            for _ in range(0 if "screen no" in each["more"] else 1 + (each["text"] or "").count("\n")):
-                at = text.find("\n", at) + 1 or len(text)
-    return kept + text[at:]
 
 
 def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
