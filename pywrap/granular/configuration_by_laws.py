@@ -42,8 +42,8 @@ FORCE_AGREEMENT = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
 
 OVERLAP_ROUNDING = 1e-14
-"""Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
-may be ten times as large."""
+"""Rounding of an overlap, as a share of the distance of two centres, beside which coordinates may be ten times as
+large."""
 
 KnownLaws = dict[tuple[Any, ...], Law]
 """By their commands, and the two types or the ID of a wall's fix."""
@@ -52,9 +52,9 @@ KnownLaws = dict[tuple[Any, ...], Law]
 class OneLaw(NamedTuple):
     """Contacts that have one law, as LAMMPS says them: between particles of two types, or with one wall.
 
-    `geometry` has the fields of LinearisedContacts that no law enters. `forces` has f_n and the vector f_t of LAMMPS's
-    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2). `rolling` has what LAMMPS says of rolling
-    friction, shape (C, 3): the force at the arm R of contacts between particles, and the whole torque of a wall.
+    `geometry` has the fields of LinearisedContacts that no law enters; `forces` f_n and the vector f_t of LAMMPS's own
+    styles, or the slip of ours, shape (C, 4); `rolling` the force of rolling friction at the arm R, or, of a wall, the
+    whole torque, shape (C, 3).
     """
 
     who: str
@@ -84,19 +84,6 @@ def configuration_by_laws(lmp: Any, looked: Looked, laws: KnownLaws) -> Configur
             raise NotTakenError(f"{says}: {known}.")
         raise NotLinearisedError(f"{says}: something else turns them, or this LAMMPS hands out contacts otherwise.")
     return derive_frozen(made, load=load)
-
-
-def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
-    """Refuse tangential forces beyond Coulomb's bound of the commands."""
-    size = np.linalg.norm(contacts.tangential_force, axis=1)
-    beyond = size > contacts.friction + FORCE_AGREEMENT * (contacts.friction + contacts.normal_force)
-    if np.any(beyond):
-        mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
-        moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
-        raise NotTakenError(
-            f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, with mu = {mu:.3g}: "
-            f"{moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
-        )
 
 
 def _linearised_contacts(
@@ -252,8 +239,6 @@ def _median_state(contacts: OneLaw, found: Arrays) -> State:
     """The contact of the median overlap, its partner of the smaller type first."""
     i, j, overlap = (contacts.geometry[name] for name in ("i", "j", "overlap"))
     k = np.argsort(overlap)[len(overlap) // 2]
-    radius, mass = found["radius"], found["rmass"]
-    if j[k] == WALL:
-        return State((radius[i[k]], 0.0), (mass[i[k]], np.inf), overlap[k])
-    first, second = sorted((i[k], j[k]), key=lambda each: found["type"][each])
-    return State((radius[first], radius[second]), (mass[first], mass[second]), overlap[k])
+    pair = [i[k]] if j[k] == WALL else sorted((i[k], j[k]), key=lambda each: found["type"][each])
+    radii, masses = (*found["radius"][pair], 0.0), (*found["rmass"][pair], np.inf)
+    return State(radii[:2], masses[:2], overlap[k])

@@ -29,12 +29,9 @@ from .look_in_a_copy import explain_error
 EXPONENT_ERROR = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
 
-OVERLAP_RANGE = 1e-3, 0.1
-"""Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
-lost ten digits, and one beyond a tenth is that of no contact."""
-
-SLIP_TRIALS = 20
-"""Slips that are tried, each a hundredth of what the last one would need at most: one is the rule."""
+OVERLAP_RANGE, SLIP_TRIALS = (1e-3, 0.1), 20
+"""Overlaps at which laws are measured, in units of a radius: one of 1e-10, as of spheres that barely touch, has lost
+ten digits; and slips that are tried, each a hundredth of what the last one would need at most: one is the rule."""
 
 POWERS = "stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot"
 CLOSING, SLIPPING, ROLLING = X, Y, Z = range(3)
@@ -81,12 +78,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         tangential_dashpot, c_n and c_t; rolling and rolling_dashpot, of rolling friction, a force at the arm R by R
         times the relative rotation. Numbers: closing and parting, d ln f_t / d ln delta at constant slip; mu,
         Coulomb's coefficient; lever, l', 0 or 1/2 of an arm that ends in the middle of the overlap; and mu_rolling,
-        the bound of rolling friction over the normal force.
-
-    Raises
-    ------
-    NotTakenError
-        If it is no power law of the kind above.
+        the bound of rolling friction over the normal force. A NotTakenError where it is no power law of this kind.
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
     first = state._replace(overlap=min(max(state.overlap, least), most))

@@ -15,8 +15,8 @@ from ...analysis import Configuration
 from ...analysis.arrays import derive_frozen
 from .balance import BALANCE, check_balance, force_scale, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
-from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import Commands, NotLinearisedError, NotTakenError, read_commands
+from .configuration_by_laws import FORCE_AGREEMENT, KnownLaws, configuration_by_laws
+from .granular_commands import GIVE_LINES, Commands, NotLinearisedError, NotTakenError, read_commands
 from .look_in_a_copy import DRAG_STYLES, in_a_copy, open_files, require_instance
 from .looks import Looked, acting_fixes, look, may_act
 from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError
@@ -48,9 +48,8 @@ def from_lammps(
         Residual that is allowed, as a share of the mean contact force; not negative.
     prove : bool
         Whether five steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
-        `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
-        1e-3 is refused, and 1e-5 or less is usual. `proof` is None for a packing whose residual exceeds the default
-        balance.
+        `proof` is their relative difference. A packing of more than 1e-3 is refused, and 1e-5 or less is usual. `proof`
+        is None for a packing whose residual exceeds the default balance.
     differences : bool
         Whether K and C are found by differences of LAMMPS's forces even where all laws of contacts are measured.
 
@@ -106,7 +105,15 @@ def take_configuration(
             held = {name: style for name, style in looked.fixes.items() if style.startswith(("spring", "indent"))}
             if acts := acting_fixes(held, looked.commands):
                 raise NotLinearisedError(f"{may_act(acts)}.")
-        check_friction(found.contacts, rests=rests)
+        size, c = np.linalg.norm(found.contacts.tangential_force, axis=1), found.contacts
+        beyond = size > c.friction + FORCE_AGREEMENT * (c.friction + c.normal_force)
+        if np.any(beyond):
+            mu = np.min(c.friction[beyond] / c.normal_force[beyond])
+            moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
+            raise NotTakenError(
+                f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, with mu = "
+                f"{mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
+            )
         return _at_rest(lmp, found, looked, balance=balance, prove=prove)
     except NotLinearisedError as error:
         reason = error

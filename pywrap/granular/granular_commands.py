@@ -87,13 +87,8 @@ def without_suffix(style: str) -> str:
 
 
 def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Commands:
-    """Commands from the lines, or the text, of a log, or from some that a user gives.
-
-    Raises
-    ------
-    NotTakenError
-        If no line is a pair_style, or a line that a user gives has a variable in it.
-    """
+    """Commands from the lines, or the text, of a log, or from some that a user gives; a NotTakenError if no line is a
+    pair_style, or a line that a user gives has a variable in it."""
     if isinstance(lines, Commands):
         return lines
     text = whole = lines if isinstance(lines, str) else "\n".join(lines)
@@ -117,13 +112,8 @@ def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Co
 
 
 def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
-    """Commands that hold after those that LAMMPS has carried out, one after the other, in words; `source` has them.
-
-    Raises
-    ------
-    NotTakenError
-        If no pair_style is among them.
-    """
+    """Commands that hold after those that LAMMPS has carried out, one after the other, in words; `source` has them. A
+    NotTakenError if no pair_style is among them."""
     style = cleared = ""
     coefficients, fixes = dict[tuple[str, ...], str](), dict[str, str]()
     for words in carried_out:

@@ -32,11 +32,9 @@ in stable time steps, at the least: ten periods of a slow mode."""
 MOST_STEPS_OF_END = 4_000_000
 """Time steps that are followed: some minutes for fifty particles."""
 
-SAME_WINDOWS, SAME_SHARE = 4, 0.15
-"""Windows whose largest D differ by less than this share, of a motion that goes on as it is."""
-
-FLOWS_FROM = 0.1
-"""Root of D over the mean diameter."""
+SAME_WINDOWS, SAME_SHARE, FLOWS_FROM = 4, 0.15, 0.1
+"""Windows whose largest D differ by less than this share, of a motion that goes on as it is; and the root of D over the
+mean diameter from which on it flows."""
 
 NO_LAMMPS = (
     "what LAMMPS does then is not followed: this packing has no LAMMPS behind it; give a run.h5, or a deck "
@@ -48,12 +46,8 @@ NO_LAMMPS = (
 def follow_by(packing: Any, lmp: Any = None) -> Callable[[Stability], Stability]:
     """What adds to a verdict where the motion that grows ends: `Stability.follow`.
 
-    Parameters
-    ----------
-    packing : Packing or Configuration
-        A Packing is moved by the plugin.
-    lmp : lammps.lammps, optional
-        The instance of which a Configuration was taken; it moves in a copy of the process, and stays as it is.
+    The plugin moves a Packing. A Configuration needs the instance `lmp` of which it was taken, which moves in a copy of
+    the process, and stays as it is.
     """
 
     c = packing.configuration

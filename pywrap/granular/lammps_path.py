@@ -70,20 +70,14 @@ def lammps_path(
     apply : callable or str
         ``apply(lmp, value)`` sets the load, whatever was set before; or the name of a variable of style equal or
         internal, on which a fix of the deck depends.
-    commands : iterable of str, optional
-        As of :func:`~faultgouge.pywrap.from_lammps`.
-    balance : float
-        Largest residual at rest, as a share of the mean contact force; not negative.
-    steps : int
-        Time steps after which a packing that is not at rest flows.
+    commands, balance, steps
+        As of `relax`.
 
     Raises
     ------
     NotTakenError
         If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
         the first value alone, and where a load changes no force.
-    BadInputError
-        If `balance` is no such number.
     NoEquilibriumError
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
@@ -221,8 +215,7 @@ def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
 
 @dataclass
 class _Relaxation:
-    """LAMMPS and how it comes to rest; `look` takes the packing as it stands, and the other fields are as of
-    `lammps_path`, and what copies of this process have, too."""
+    """LAMMPS and how it comes to rest; `look` takes the packing as it stands."""
 
     lmp: Any
     apply: Callable[[Any, float], object] | str
@@ -263,8 +256,8 @@ class _Relaxation:
             except FaultgougeError:
                 raise
             except (Exception, SystemExit) as error:  # of whatever kind: the function is the user's
-                of_lammps = str(error).startswith("ERROR")
-                what = explain_error(error) if of_lammps else f"apply failed with {type(error).__name__}: {error}"
+                failed = f"apply failed with {type(error).__name__}: {error}"
+                what = explain_error(error) if str(error).startswith("ERROR") else failed
                 raise NotTakenError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")

@@ -97,20 +97,15 @@ def open_files() -> dict[int, OpenFile]:
 
 
 def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
-    """An instance's log among files that were open, which is closed by the question; None without a log.
-
-    A copy of the process asks with the open files of the process itself.
-    """
+    """The log of an instance that is a copy, among the open files of the process itself; the question closes it."""
     lmp.command("log none")  # a log of the command `log` does not begin as others do
     closed = [file for descriptor, file in files.items() if not Path(f"/proc/self/fd/{descriptor}").exists()]
     return closed[0] if len(closed) == 1 else None
 
 
 def silent_copy(*keep: int) -> int:
-    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0.
-
-    The process decides what Ctrl-C ends: call this where :func:`interrupts_wait`.
-    """
+    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0. The
+    process decides what Ctrl-C ends: call this where :func:`interrupts_wait`."""
     ctypes.CDLL(None).fflush(None)  # buffered text would be written twice
     child = os.fork()
     if child:
@@ -135,7 +130,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     NotTakenError. All traces of the work end with the copy, and an interrupt of this process ends the copy, too."""
     here, there = Pipe(duplex=False)
     this, child = os.getpid(), 0
-    found: Any
+    found: Any = NotTakenError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
     try:
         with interrupts_wait():
             child = silent_copy(there.fileno())
@@ -148,9 +143,8 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
                 finally:
                     os._exit(0)
         there.close()
-        found = here.recv()
-    except EOFError:
-        found = NotTakenError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
+        with suppress(EOFError):
+            found = here.recv()
     finally:
         here.close()
         if child:

@@ -42,14 +42,11 @@ class MotionComparison:
     Attributes
     ----------
     difference : float
-        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing, with the root of the masses.
-    time, timestep : float
-        The time, a whole number of steps, and the step.
+        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing.
+    time, timestep, periods : float
+        The time, a whole number of steps; the step; and how many periods of the fastest undamped vibration it has.
     velocity, linear_velocity : ndarray, shape (E,)
-        Velocities of LAMMPS and of the linearised packing, times the root of the masses, of the coordinates that feel
-        a force.
-    periods : float
-        How many periods of the fastest vibration without dashpots the time has.
+        v and u, times the root of the masses, of the coordinates that feel a force.
     """
 
     difference: float
@@ -58,9 +55,6 @@ class MotionComparison:
     velocity: Floats
     linear_velocity: Floats
     periods: float
-
-    def __float__(self) -> float:
-        return self.difference
 
     def __str__(self) -> str:
         return (
@@ -87,7 +81,7 @@ def compare_motion(
     lmp : lammps.lammps
         The instance, as it was when the configuration was taken; on one rank.
     configuration : Configuration
-        Of :func:`~faultgouge.pywrap.from_lammps`.
+        As `from_lammps` took it.
     time : float
         How long, positive.
     amplitude : float
@@ -101,15 +95,14 @@ def compare_motion(
     Returns
     -------
     MotionComparison
-        `difference` is the relative difference; it is also the value of ``float(...)``.
+        `difference` is the relative difference.
 
     Raises
     ------
     NotTakenError
-        If the instance has several ranks or threads, or other particles than the configuration, or none of these feels
-        a force.
+        If the instance has several ranks or threads, or other particles, or none of these feels a force.
     BadInputError
-        If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
+        If a time, the step or the amplitude is not positive and finite.
     """
     require_instance(lmp, "compare_motion")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)

@@ -64,9 +64,11 @@ def prove(lmp: Any, configuration: Configuration, others: str) -> float | None:
     `others` is what is said of fixes that may exert other forces than contacts. A NotProvedError if something acts
     beside contacts, or may do so; else a NotTakenError if LAMMPS's forces do not change as K says.
     """
-    c, timestep, by_laws = configuration, _stable_step(configuration), configuration.operators == "laws"
-    if not timestep:
-        return None
+    c, by_laws, scale = configuration, configuration.operators == "laws", 1 / np.sqrt(configuration.coordinate_mass)
+    k, d = (float((scale * (abs(each) @ scale)).max(initial=0.0)) for each in c.assembled_operators())
+    if not k and not d:
+        return None  # nothing that moves has a contact
+    timestep = STEP_PHASE / (0.5 * (d + np.sqrt(d * d + 4 * k)))  # stable: over a bound of the root of s^2 = d s + k
     difference = _least_difference(lmp, c, timestep, STEPS_OF_PROOF)
     if by_laws and _other_stiffness(lmp, c) > OTHER_STIFFNESS:
         raise NotProvedError(
@@ -104,15 +106,6 @@ def _likely(c: Configuration, others: str) -> str:
             "particles, and they may be no functions of the displacements of neighbours, as with the model mdr"
         )
     return "; or ".join(causes)
-
-
-def _stable_step(c: Configuration) -> float:
-    """A time step that is stable for certain, by sums of rows in absolute values; zero if nothing that moves has a
-    contact."""
-    scale = 1 / np.sqrt(c.coordinate_mass)
-    k, d = (float((scale * (abs(each) @ scale)).max(initial=0.0)) for each in c.assembled_operators())
-    rate = 0.5 * (d + np.sqrt(d * d + 4 * k))  # the root of s^2 = d s + k
-    return STEP_PHASE / rate if rate else 0.0
 
 
 def _least_difference(lmp: Any, c: Configuration, timestep: float, count: int) -> float:

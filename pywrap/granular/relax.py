@@ -25,8 +25,7 @@ from .look_in_a_copy import explain_error, require_instance
 from .looks import acting_fixes, may_act
 
 REST_SHARE = 1e-8
-"""Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
-rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
+"""Residual over the mean contact force at rest: far below couplings that make complex pairs, and above rounding."""
 
 STEPS_BETWEEN_LOOKS = 2000
 STEPS_WITHOUT_GAIN = 50 * STEPS_BETWEEN_LOOKS
@@ -65,7 +64,7 @@ def relax(
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
         Largest residual at rest, as a share of the mean contact force; of packings so stiff that the rounding of
-        coordinates leaves more, this rounding.
+        coordinates leaves more, this rounding. Not negative.
     steps : int
         Time steps after which a packing that is not at rest flows.
     watch : callable, optional
@@ -80,8 +79,6 @@ def relax(
     ------
     NotTakenError
         If the instance cannot be taken, as by `from_lammps`.
-    BadInputError
-        If `balance` is no such number.
     NoEquilibriumError
         If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
 
@@ -175,8 +172,9 @@ def bring_to_rest(
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
             if way > far * diameter:
-                moved = f"{far:g} diameters" if far > 1 else "a diameter"
-                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
+                raise NoEquilibriumError(
+                    f"The packing flows{where}: its particles have moved by {counted(round(far), 'diameter')}."
+                )
             ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
             rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
     finally:

@@ -1,15 +1,12 @@
 """Run a LAMMPS deck as `lmp -in` does in its folder, and take its last state as it stands.
 
-LAMMPS alone reads the deck: loops, includes and labels, `shell cd`, `if ... then ... quit`, logs and files are as
-LAMMPS has them, and no command is left out, added or carried out twice. The plugin watches LAMMPS
+LAMMPS alone reads the deck, and no command is left out, added or carried out twice. The plugin watches LAMMPS
 (`pair_mindlin_smooth/deck_watch.cpp`): LAMMPS tells each command that it has carried out, with variables filled in, and
-at `quit` hands the instance back. Once the deck has ended, the log is closed, and no file of the deck is written any
-more.
+at `quit` hands the instance back. Once the deck has ended, no file of the deck is written any more.
 
-**A state that cannot be taken** is kept, so that hours of a run are not lost. A run of one step writes the restart
-file: in a file that `write_restart` writes after a run, LAMMPS leaves tangential histories out. The deck beside it goes
-on from there with the commands that hold. Several ranks hand their state in such files to a process of one rank, as a
-look needs a copy of the process.
+**A state that cannot be taken** is kept. A run of one step writes the restart file: in a file that `write_restart`
+writes after a run, LAMMPS leaves tangential histories out. The deck beside it goes on from there with the commands that
+hold. Several ranks hand their state in such files to a process of one rank, as a look needs a copy of the process.
 """
 
 import ctypes
@@ -41,10 +38,9 @@ from .relax import relax
 WORLD = MPI.COMM_WORLD
 
 AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log", "-echo", "both")
-"""Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands."""
-
 OF_RANKS = "PMI", "MPI", "OMPI", "HYD", "SLURM"
-"""Beginnings of the environment's names by which a process is one of several ranks."""
+"""Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands; and
+beginnings of the environment's names by which a process is one of several ranks."""
 
 BEFORE_RUNS = ctypes.CFUNCTYPE(None)(lambda: None)
 QUIT = "faultgouge: the deck ends by quit"
@@ -52,8 +48,6 @@ QUIT = "faultgouge: the deck ends by quit"
 
 LIGGGHTS = ("hard_particles", "atom_style granular", "gran model", "property/global", "mesh/surface", "insert/")
 """Words of LIGGGHTS's commands that LAMMPS does not have."""
-
-RESTART = "RESTART.FILE"
 
 WRITERS, ENDS = ("print", "ave/", "record"), (*INSERTS, "halt")
 """Beginnings of the styles of fixes that write files, and of those that make particles, or end a run."""
@@ -201,25 +195,25 @@ def _keep_state(lmp: Any, carried_out: list[list[str]], keep: Path, deck: Path) 
                 lmp.command(line)
         except Exception as error:  # LAMMPS's bindings raise any error
             return f"The state is not kept: {explain_error(error)}"
-        lines = _deck_lines(carried_out, styles_of(lmp).fixes)
+        fixes = styles_of(lmp).fixes
         stem, says = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII), ""  # LAMMPS reads the name in a line
         if WORLD.rank == 0:
             names = (keep.with_name(f"{stem}{f'.{number}' * (number > 0)}.restart") for number in count())
             kept = next(name for name in names if not (os.path.lexists(name) or os.path.lexists(f"{name}.in")))
-            text = "\n".join([f"# goes on where {deck.name} has ended", *lines, ""]).replace(RESTART, kept.name)
+            lines = [f"# goes on where {deck.name} has ended", *_deck_lines(carried_out, fixes, kept.name), ""]
             says = (
                 f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it goes on from there: "
                 f"faultgouge import {kept} --relax, or with a line run in that deck."
             )
             try:
                 write_whole(kept, max(folder.iterdir()).read_bytes())
-                write_whole(Path(f"{kept}.in"), os.fsencode(text))
+                write_whole(Path(f"{kept}.in"), os.fsencode("\n".join(lines)))
             except OutputError as error:
                 says = f"The state is not kept: {error}"
         return WORLD.bcast(says, root=0)
 
 
-def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]:
+def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str], restart: str) -> list[str]:
     """The lines of a deck that goes on from a restart file: of all commands, in words, that LAMMPS has carried out,
     those that hold; `fixes` are the styles of those that there are, by ID."""
     since = 1 + max((k for k, words in enumerate(carried_out) if words[0] == "clear"), default=-1)
@@ -239,7 +233,7 @@ def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str
         for words in last.values()
         if words[0] in BEHIND and words[2:3] != ["delete"] and (not words[0].startswith("fix") or words[1] in stay)
     ]
-    return [*map(_line, before), f"read_restart {RESTART}", *map(_line, behind)]
+    return [*map(_line, before), f"read_restart {restart}", *map(_line, behind)]
 
 
 def _line(words: list[str]) -> str:
