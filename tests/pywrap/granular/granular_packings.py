@@ -1,6 +1,7 @@
 """Packings of LAMMPS's own granular styles, and of ours, as a user's script sets them up."""
 
 import numpy as np
+import pytest
 
 LAWS = {
     "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
@@ -88,7 +89,7 @@ MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 
 
-def instance(*arguments: str):
+def instance(log=None):
     """LAMMPS on the ranks of this process, with the plugin."""
     from faultgouge.pywrap import Engine  # loads what is needed, in order
 
@@ -97,7 +98,14 @@ def instance(*arguments: str):
 
     from faultgouge.pywrap.lammps.instance import lammps_instance
 
-    return lammps_instance(MPI.COMM_WORLD, *arguments or (None,))
+    return lammps_instance(MPI.COMM_WORLD, log)
+
+
+def refused(says: str):
+    """Expects that a packing is refused with these words."""
+    from faultgouge.pywrap import NotTakenError
+
+    return pytest.raises(NotTakenError, match=says)
 
 
 def command(lmp, lines: str) -> None:
@@ -107,23 +115,10 @@ def command(lmp, lines: str) -> None:
 
 def start(lmp, d: int, count: int) -> None:
     """Particles of two sizes above a floor, in a sheared box of spheres, or one of disks."""
-    rng = np.random.default_rng(5)
-    width = 3.0 if d == 3 else 4.4
+    rng, width = np.random.default_rng(5), 3.0 if d == 3 else 4.4
     box = "prism 0 3 0 3 0 40 0.5 0 0" if d == 3 else "block 0 4.4 0 40 -0.5 0.5"
-    command(lmp, f"""
-units lj
-dimension {d}
-atom_style sphere
-atom_modify map array
-boundary {"p p f" if d == 3 else "p f p"}
-newton off
-comm_modify vel yes
-processors {"* * 1" if d == 3 else "* 1 *"}
-region box {box} units box
-create_box 2 box
-neighbor 0.2 bin
-neigh_modify every 1 delay 0 check yes
-""")  # fmt: skip
+    command(lmp, head(box, "p p f" if d == 3 else "p f p", kinds=2, dimension=d))
+    command(lmp, "neighbor 0.2 bin\nneigh_modify every 1 delay 0 check yes")
     across = int(width // 1.05)
     layer = across ** (d - 1)
     for k in range(count):
@@ -144,6 +139,22 @@ def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str 
     plane = "zplane" if d == 3 else "yplane"
     if w:
         lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+
+
+def on_slope(log, law: str, d: int, slope, dashpots=("40", "40"), e=("", ""), mu: str = "3.0", run: int = 0):
+    """LAMMPS with particles that come to rest on a slope."""
+    lmp = instance(log)
+    start(lmp, d, 20 if d == 3 else 18)
+    with_law(lmp, law, d, *dashpots, e, mu)
+    command(lmp, f"""
+fix load all gravity 1.0 vector {slope} {"0 -1" if d == 3 else "-1 0"}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+run {run} post no
+""")  # fmt: skip
+    return lmp
 
 
 def of_particle(lmp, name: str, number: int) -> np.ndarray:
