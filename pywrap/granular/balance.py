@@ -52,8 +52,8 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
         "allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise NotTakenError(
-        f"The packing moves: the residual of {who} is "
-        f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
+        f"The packing moves: the residual of {who} is {size[worst] / force if force else np.inf:.3g} of the mean "
+        f"contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
 

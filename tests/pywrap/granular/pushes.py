@@ -3,6 +3,7 @@
 from itertools import islice
 
 import numpy as np
+import pytest
 from granular_packings import command
 
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
@@ -54,6 +55,16 @@ def pushed(lmp, here, push, times, dt, size=PUSH):
         return found
 
     return np.transpose([in_a_quiet_copy(lmp, lambda v=v: follow(v), f"timestep {dt}") for v in push.T])
+
+
+def moves_alike(lmp, found, time) -> None:
+    """LAMMPS moves as K and C say, extrapolated to a step of zero: dashpots feel the velocity of half steps."""
+    from faultgouge.pywrap import compare_motion
+
+    runs = [compare_motion(lmp, found, time, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
 
 
 def in_steps(here, push, times, dt):

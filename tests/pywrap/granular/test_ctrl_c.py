@@ -8,6 +8,8 @@ import pytest
 
 SET_UP = """
 import os, signal, sys, threading, time
+from contextlib import suppress
+from pathlib import Path
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 sys.path.insert(0, {tests!r})
 from granular_packings import command, instance, start, with_law
@@ -68,16 +70,11 @@ with lammps_path(lmp, tilt, commands=given) as path:
         print(f"{time.monotonic() - began < 30}")
     print(path(0.1) == first, abs(path(0.05).fx - 0.05) < 1e-12)
 time.sleep(0.2)
-group = [each for each in os.listdir("/proc") if each.isdigit() and each != str(os.getpid())]
 alive = []
-for each in group:
-    try:
-        with open(f"/proc/{each}/stat") as stat:
-            state, _, of = stat.read().rpartition(")")[2].split()[:3]
-    except OSError:
-        continue
-    if int(of) == os.getpgid(0) and state != "Z":
-        alive.append(each)
+for each in Path("/proc").glob("[0-9]*/stat"):
+    with suppress(OSError):
+        state, _, of = each.read_text().rpartition(")")[2].split()[:3]
+        alive += [each] * (int(of) == os.getpgid(0) and state != "Z" and each.parent.name != str(os.getpid()))
 print(alive)
 """
 
