@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, command, deck, head, instance, refused
+from granular_packings import LAWS, command, deck, instance, refused
 from pushes import moves_alike
 from scipy.spatial import cKDTree
 
@@ -81,10 +81,12 @@ def test_dashpots_of_frozen_particles_and_weak_contacts_among_strong_ones(lammps
     other contacts opens a weak one, and has it slide; a finer one does not."""
     lmp = lammps_with(lines)
     found, laws = (faultgouge.from_lammps(lmp, differences=each, balance=np.inf, prove=False) for each in (True, False))
-    assert apart(damping_matrix(found), damping_matrix(laws)) < 1e-6
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < (1e-5 if lines is FROZEN else 1e-6)
     assert found.operator_error < 1e-5
-    assert lines is FROZEN or not len(found.one_sided_particles)
+    if lines is FROZEN:
+        assert apart(damping_matrix(found), damping_matrix(laws)) < 1e-6
+    else:
+        assert not len(found.one_sided_particles)
 
 
 @pytest.mark.parametrize("gap", [1e-13, 1e-5])
@@ -172,34 +174,18 @@ def test_particles_far_apart_that_something_couples(lammps_with):
         faultgouge.from_lammps(lmp, differences=True, balance=np.inf)
 
 
-CONE = (
-    head("block -9 9 -9 9 -1 26").replace("lj", "si")
-    + """
-region cone cone z 0 0 0.6 8 0 25 side in units box
-region pour cylinder z 0 0 2.4 9.5 24 units box
-create_atoms 1 random {number} 4711 pour overlap 0.9 maxtry 2000
-set group all diameter 1.0
-set group all density 1.0
-neighbor 0.1 bin
-pair_style granular
-pair_coeff * * {model}
-fix cone all wall/gran/region granular {model} region cone
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-fix drag all viscous 0.5
-timestep 0.0005
-thermo 100000
-run 20000
-"""
-)
-
-
 @pytest.fixture(scope="module", params=[36, pytest.param(126, marks=pytest.mark.long)])
 def cone(request, tmp_path_factory):
     """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     lmp = instance(tmp_path_factory.mktemp("cone") / "log.lammps")
-    model = "jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
-    command(lmp, CONE.format(number=request.param, model=model))
+    model = "granular jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
+    pour = "region pour cylinder z 0 0 2.4 9.5 24 units box\ncreate_atoms 1 random"
+    walls = f"region cone cone z 0 0 0.6 8 0 25 side in units box\nfix cone all wall/gran/region {model} region cone"
+    command(lmp, deck(
+        [], model, box="block -9 9 -9 9 -1 26", units="si", timestep=5e-4, run="run 20000",
+        fill=f"{pour} {request.param} 4711 pour overlap 0.9 maxtry 2000\nneighbor 0.1 bin",
+        more=f"{walls}\nfix move all nve/sphere\nfix drag all viscous 0.5",
+    ))  # fmt: skip
     faultgouge.relax(lmp)
     yield lmp, faultgouge.from_lammps(lmp)
     lmp.close()

