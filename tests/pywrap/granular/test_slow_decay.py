@@ -25,7 +25,8 @@ create_atoms 1 random 50 11 pile overlap 0.9 maxtry 2000
 set group all type/fraction 2 0.5 12"""
 DECK = deck(
     [], LAW, "zplane 0 NULL contacts", box="block 0 3.2 0 3.2 0 60", boundary="p p f", fill=POURED,
-    diameters=(0.8, 1.0), density="density 1.9", more="fix move all nve/sphere\nfix drag all viscous 1.0", timestep=0.002, run=RAISED,
+    diameters=(0.8, 1.0), density="density 1.9", timestep=0.002, run=RAISED,
+    more="fix move all nve/sphere\nfix drag all viscous 1.0",
 )  # fmt: skip
 """Fifty spheres on a slope that is raised slowly."""
 
