@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
 LAWS = {
     "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
     "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
@@ -19,25 +20,21 @@ LAWS = {
         "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
         "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
     ),
-    "mindlin_rescale": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale 9e2 1.0 3.0",
-    ),
-    "mindlin_rescale/force": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale/force 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale/force 9e2 1.0 3.0",
-    ),
     "tsuji": (
         "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
         "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
     ),
+} | {
+    law: (
+        "granular", [f"* * hertz 3e3 {{g}} tangential {law} 9e2 1.0 3.0"],
+        f"granular hertz 3e3 {{w}} tangential {law} 9e2 1.0 3.0",
+    ) for law in RESCALED
 }  # fmt: skip
 """Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
 
 The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
 hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
 
-RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
 ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
@@ -156,6 +153,21 @@ thermo 100000
 run {run} post no
 """)  # fmt: skip
     return lmp
+
+
+def is_proved(found, operators: str, error: float = 1e-5) -> None:
+    """K and C are those of laws, or differences, and LAMMPS moves as they say."""
+    assert found.operators == operators
+    assert max(found.operator_error, found.proof) < error
+
+
+def agree(found, other, of_k: float = 1e-5, of_c: float = 1e-6) -> None:
+    """K and C are those of another configuration, as shares of the largest entry."""
+    from faultgouge.analysis import damping_matrix, stiffness_matrix
+
+    for matrix, share in ((stiffness_matrix, of_k), (damping_matrix, of_c)):
+        one, expected = matrix(found), matrix(other)
+        assert abs(one - expected).max() <= share * abs(expected).max()
 
 
 def of_particle(lmp, name: str, number: int) -> np.ndarray:

@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, on_slope, refused
+from granular_packings import command, deck, is_proved, on_slope, refused
 
 import faultgouge
 from faultgouge.analysis import stiffness_matrix
@@ -44,12 +44,6 @@ def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
         return faultgouge.from_lammps(lmp, prove=prove)
 
     return in_a_copy(work)
-
-
-def taken_by_differences(found) -> None:
-    assert found.operators == "differences"
-    assert found.proof < 1e-5
-    assert found.operator_error < 1e-5
 
 
 ACTS = "may act on particles as contacts do not tell"
@@ -97,14 +91,14 @@ def test_a_load_that_follows_the_time(spheres):
 )  # fmt: skip
 def test_forces_of_places_are_taken_by_differences(spheres, fix, run):
     """The laws of contacts do not have them, which the proof shows; K by differences does, and has a proof."""
-    taken_by_differences(look(*spheres, f"group one id 1\ngroup other id 9\nfix trap {fix}", run))
+    is_proved(look(*spheres, f"group one id 1\ngroup other id 9\nfix trap {fix}", run), "differences")
 
 
 def test_a_force_of_places_is_in_the_operator(spheres):
     """F = -0.2 (x - 1.5) adds 0.2 to each x of K."""
     found, laws = (look(*spheres, "fix trap all addforce v_trap 0 0", 10000, prove=prove) for prove in (True, False))
     assert laws.operators == "laws"
-    taken_by_differences(found)
+    is_proved(found, "differences")
     added = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray()
     expected = np.diag(np.repeat([0.2, 0.0], [len(found), 5 * len(found)]))
     assert added == pytest.approx(expected, abs=1e-5 * laws.contacts.normal_stiffness.max())
@@ -120,9 +114,7 @@ WITHOUT_EFFECT = [
 @pytest.mark.parametrize("fix", WITHOUT_EFFECT)
 def test_fixes_without_effect_on_small_motion(spheres, fix):
     """Whatever their names are, the proof takes them."""
-    found = look(*spheres, f"fix trap all {fix}", 10000)
-    assert found.operators == "laws"
-    assert found.proof < 1e-5
+    is_proved(look(*spheres, f"fix trap all {fix}", 10000), "laws")
 
 
 def test_proof_is_kept(sliding, tmp_path):
@@ -189,7 +181,7 @@ run 60000"""
     more = "1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4"
     lmp = lammps_with(spheres.replace("create_box 1 box", f"create_box {more}"))
     found = faultgouge.from_lammps(lmp)
-    taken_by_differences(found)
+    is_proved(found, "differences")
     lmp.command("delete_bonds all bond 1 remove")
     without = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
     # E = 50 (r - 0.99)^2

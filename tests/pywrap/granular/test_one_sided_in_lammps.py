@@ -93,26 +93,21 @@ def test_few_disks_after_a_push(small, law):
     assert abs(found[-1] / linear.mean_square_displacement[0] - 1) > 0.05
 
 
-@pytest.mark.parametrize("law", [pytest.param("gran/hertz/history", marks=pytest.mark.long), "mindlin/force"])
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=pytest.mark.long if law == "gran/hertz/history" else ()) for law in SMALL]
+)
 def test_what_is_said_to_rest_is_at_rest_in_lammps(small, law):
-    """Each push in LAMMPS, twice as long as it was followed: the same amplification, and D does not grow."""
+    """Each push in LAMMPS, twice as long as it was followed: the same amplification, and D does not grow. With two
+    derivatives sliders creep on for hundreds of units of time, and a motion that has not settled gets no verdict."""
     lmp, here = small(law)
-    told = stability(here)
-    assert told.stable is True
-    times = np.linspace(0, 2 * told.one_sided.time, 61)[1:].round(1)
-    found = pushed(lmp, here, random_pushes(here, PUSHES), times, 2e-3)
+    settles = "rescale" not in law
+    told = stability(here, time=None if settles else 20.0)
+    assert told.stable is (True if settles else None)
+    assert settles or "has not settled" in told.reasons[0]
+    times = np.linspace(0, 2 * told.one_sided.time if settles else 20.0, 61)[1:].round(1)
+    found = pushed(lmp, here, random_pushes(here, PUSHES), times, 2e-3 if settles else 1e-3)
     assert found.max() == pytest.approx(told.one_sided.amplification, rel=AGREES)
-    assert found[30:].max() <= found[:30].max() * (1 + AGREES)
-
-
-def test_a_motion_that_has_not_settled_gets_no_verdict(small):
-    """Two derivatives: a contact closes and opens with its own, and sliders creep on for hundreds of units of time."""
-    lmp, here = small("mindlin_rescale/force")
-    told = stability(here, time=20.0)
-    assert told.stable is None
-    assert "has not settled" in told.reasons[0]
-    found = pushed(lmp, here, random_pushes(here, PUSHES), np.linspace(0, 20.0, 41)[1:], 1e-3)
-    assert found.max() == pytest.approx(told.one_sided.amplification, rel=AGREES)
+    assert not settles or found[30:].max() <= found[:30].max() * (1 + AGREES)
 
 
 @pytest.mark.long
