@@ -128,7 +128,7 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         if found:
             return packing
         report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
-        engine.settle(finer * loose.fy, packing, steps=STAGE_STEPS)
+        engine.settle(finer * loose.fy, packing, viscosity=viscosity, steps=STAGE_STEPS)
     return minimize_energy(engine.packing)[0]
 
 
