@@ -262,7 +262,7 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
         check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         digest = hashlib.sha256(read_plain(path)).hexdigest()
         rows, left_out = Rows(output / "cycle.jsonl", digest[:12]), ("scene", "version")
-        spring, slips, times = float(settings.spring), slips_in(file), file.observable("time")
+        spring, slips, times = float(settings.spring), slips_in(file)[0], file.observable("time")
         series, displacement = file.series(SERIES), file.observable("displacement")
         missing = [frame for frame in range(len(file)) if rows.find(frame=frame) is None]
         for frame in progress(missing, len(missing)):
