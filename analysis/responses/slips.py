@@ -83,11 +83,6 @@ class SlipDetector:
         The fastest velocity of the far end of the spring, length / time.
     period : float
         Of the layer on the spring, time.
-
-    Attributes
-    ----------
-    under_way : bool
-        Whether the layer slips.
     """
 
     def __init__(self, velocity: float, period: float) -> None:
@@ -107,11 +102,10 @@ class SlipDetector:
     @property
     def so_far(self) -> Slip | None:
         """The slip under way, up to its last fast motion; None between slips."""
-        begin, end = self._begin, self._end
+        (begin, end), energy = (self._begin, self._end), self._energy_at_end
         if begin is None or end is None:
             return None
-        way = end.displacement - begin.displacement
-        return Slip(begin.time, end.time, begin.force, end.force, way, self._energy_at_end)
+        return Slip(begin.time, end.time, begin.force, end.force, end.displacement - begin.displacement, energy)
 
     @property
     def undecided(self) -> set[float]:
