@@ -126,20 +126,8 @@ class NormalForm:
         return float(1 / (self.delta * np.sqrt(self.epsilon))) / self.frequency if self.epsilon > 0 else np.inf
 
     def solution(self, time: ArrayLike, damping_time: float | None = None) -> Floats:
-        """The exact motion from rest at a displacement across v*, without forcing.
-
-        Parameters
-        ----------
-        time : array_like, shape (T,)
-            Times.
-        damping_time : float, optional
-            tau; none by default.
-
-        Returns
-        -------
-        ndarray, shape (T, 2)
-            The coordinates x; the displacement of the packing is V x.
-        """
+        """The exact motion x from rest at a displacement across v*, shape (T, 2), with a damping time or without; the
+        displacement of the packing is V x."""
         t, gamma = np.asarray(time, dtype=float) * self.frequency, self._gamma(damping_time)
         r, s, d = self._rates(gamma)
         # The motion is exp(-gamma t) (cos(St) + gamma sin(St)/S), each as its parts along 1 and along N.
