@@ -16,9 +16,6 @@ from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
 from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence, refuse
 
-SPARSEST = 10.0
-"""Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
-
 
 class SettlingLoad(Section):
     """packing.settle_at: the load and the stiffness under which a packing settles, if these are not the scene's.
@@ -96,8 +93,6 @@ class GeneratedPacking(Section):
         cutoff, row = 2 * max(self.radii), 2 * self.disks * max(self.radii)
         says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
         refuse(self.periodic and self.width < 2 * cutoff, "width", says)
-        says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
-        refuse(self.width > SPARSEST * row, "width", says)
         open_ = not self.periodic and (self.top < self.disks or row > self.width)
         says = "leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
         refuse(open_, "periodic", f"= false {says}")

@@ -162,7 +162,7 @@ class Scene(Section):
             says += f"{smallest:g}, where the contact law does not hold: lower it, or raise law.kn = {kn:g}"
             refuse(not overlap < smallest, "load.fy", says)
             says = f"= {kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of "
-            says += "F_y, and no packing comes to rest: lower it, or raise load.fy"
+            says += "F_y, and no packing comes to rest: lower it or packing.width, or raise load.fy"
             refuse(not rounding < ROUNDING_LIMIT, "law.kn", says)
         if self.damping and ramp:
             says = "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no "
