@@ -139,9 +139,9 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
     --------
     >>> found = faultgouge.frames("run.h5")
     >>> len(found), round(found[-1].fx, 3)
-    (25, 2.4)
+    (17, 2.4)
     >>> [round(packing.fx, 3) for packing in found[:3]]
-    [0.0, 0.1, 0.2]
+    [0.0, 0.15, 0.3]
     """
 
     def __init__(self, file: str | Path) -> None:
