@@ -254,17 +254,6 @@ def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexe
     return Inverse(system, point).eigenpairs(count)[0]
 
 
-def overlap_near(system: System, value: complex) -> float:
-    """|y^H x| of the motion next to a value, with dissipation |y^H (2 s + G) x| / |2 s|, by inverse iteration."""
-    inverse = Inverse(system, value)
-    x = y = np.random.default_rng(0).standard_normal(len(system.active))
-    for _ in range(4):
-        x, y = (each / np.linalg.norm(each) for each in (inverse.solve(x), inverse.solve(y, True)))
-    if system.damping is None:
-        return float(abs(np.vdot(y, x)))
-    return float(abs(np.vdot(y, 2 * inverse.shift * x + inverse.damping @ x)) / abs(2 * inverse.shift))
-
-
 class Inverse:
     """(A - sigma)^(-1) or (Z - sigma)^(-1) next to a point, from factors of A - sigma or sigma^2 + sigma G + A.
 

@@ -32,8 +32,6 @@ class Edge:
     eigenvalue : float or complex
         Without dissipation the double eigenvalue (the real part of the pair if it does not coalesce there),
         1 / time^2; with it s, complex, 1 / time.
-    overlap : float
-        Smallest |y^H x| met at the edge; at an exceptional point it is the root of the rounding error.
     kind : {"coalescence", "hopf", "steady", "contact change", "start"}
         Two real eigenvalues that meet; Re s that goes through zero, with Im s or without; a jump of the equilibrium; or
         nothing, as the motion grows at the smallest load.
@@ -42,7 +40,6 @@ class Edge:
     fx: float
     error: float
     eigenvalue: float | complex
-    overlap: float
     kind: Kind
 
 

@@ -328,7 +328,7 @@ def _edge_at(state: Motions, k: int, fx: float, error: float) -> Edge:
     """The edge of a motion that grows from the start, without an error, or that is not solved for."""
     value = complex(state.values[k])
     value = value if state.system.damping is not None else value.real
-    return Edge(fx, error, value, float(state.overlap[k]), "contact change" if error else "start")
+    return Edge(fx, error, value, "contact change" if error else "start")
 
 
 def recognised(below: Motions, above: Motions, least: float) -> tuple[list[tuple[int, int]], list[int], list[int]]:

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.windows import System, find_onset, find_windows
-from faultgouge.analysis.windows.find_onset import windows_up_to
+from faultgouge.analysis.windows.search import Search
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
@@ -88,7 +88,7 @@ def test_a_steady_loss_of_stability_is_no_hopf_point():
 
 
 def test_what_is_known_is_told_as_it_comes():
-    told = list(windows_up_to(family(crossing(0.2), (1e-3, 1e-3)), [-1.0, 0.0, 0.4, 1.0, 2.0]))
+    told = list(Search(family(crossing(0.2), (1e-3, 1e-3)), 1e-7).along([-1.0, 0.0, 0.4, 1.0, 2.0]))
     assert [fx for fx, _ in told] == [0.0, 0.4, 1.0, 2.0]
     assert [len(windows) for _, windows in told] == [0, 1, 1, 1]
     assert [windows[0].fx_end is None for _, windows in told[1:]] == [True, False, False]
