@@ -15,7 +15,7 @@ from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
 from ..progress import Watch, report_progress, show_progress
-from .motions import Motions, System, force_bearing
+from .motions import System, force_bearing
 from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
 from .quiet import Quiet
 from .search import Look, Search, SystemOfLoad
@@ -43,7 +43,6 @@ def find_windows(
     narrowest: float | None = None,
     look: Look = lambda below, above: (),
     first: bool = False,
-    decompose: Callable[[System], Motions] = Motions.of,
 ) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.
 
@@ -59,8 +58,6 @@ def find_windows(
         Two neighbouring loads -> further loads between them at which to look; these may have no equilibrium.
     first : bool
         Go no farther than the increment in which the first window begins.
-    decompose : callable, optional
-        System -> all of its motions.
 
     Returns
     -------
@@ -76,8 +73,8 @@ def find_windows(
     # the pair of a narrower window would grow more slowly than any run can show
     narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
     start = system(float(loads[0]))
-    few = Quiet(decompose) if start.damping is not None and len(start.active) > FEW_COORDINATES else None
-    for fx, windows in Search(system, narrowest, few, first, decompose).along(loads, look):
+    few = Quiet() if start.damping is not None and len(start.active) > FEW_COORDINATES else None
+    for fx, windows in Search(system, narrowest, few, first).along(loads, look):
         says = f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}"
         if windows:
             says += f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}"
@@ -168,8 +165,8 @@ def find_onset(
         If no motion grows at any load; with dissipation a NoGrowthError, which has the onset without dissipation.
     TurningPointError
         If an eigenvalue is negative before any is complex.
-    LostPairError, SliceError
-        Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
+    SliceError
+        Of a large packing, if a part of the spectrum is not found.
     OutputError, DamagedSliceError
         If a file in the folder cannot be written, or read.
     ValueError
@@ -180,21 +177,12 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    takes_all, ends, kept = takes_all_modes(start, limits), list[float](), dict[float, Motions]()
-
-    def decompose(system: System) -> Motions:
-        """All motions; those without dissipation are kept for the search with it, which begins with them."""
-        if system.damping is None and system.fx in kept:
-            return kept[system.fx]
-        found = Motions.of(system)
-        if system.damping is None and 16 * found.right.size * (len(kept) + 1) < 2e8:  # bytes
-            kept[system.fx] = found
-        return found
+    takes_all, ends = takes_all_modes(start, limits), list[float]()
 
     def windows_of(system: SystemOfLoad, look: Look = lambda below, above: ()) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if takes_all:
-            windows = find_windows(system, loads, look=look, first=first, decompose=decompose)
+            windows = find_windows(system, loads, look=look, first=first)
             return windows[:1] if first else windows, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
@@ -244,7 +232,7 @@ def find_onset(
         windows = beside.windows
         if not beside.complete:  # only the first is known
             with suppress(NoEquilibriumError):
-                windows = find_windows(lambda fx: System.of(at(fx)), [below, above], decompose=decompose)
+                windows = find_windows(lambda fx: System.of(at(fx)), [below, above])
         ends = [(each.fx_onset, each.fx_end) for each in windows if each.fx_end is not None]
         middles = [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
         return [each.fx_onset for each in windows if below < each.fx_onset < above] + middles
