@@ -94,14 +94,10 @@ class Modes:
     def of_matrix(cls, matrix: csr_array, axes: int = 3) -> "Modes":
         """All modes by LAPACK, sorted by real part, then imaginary part, without coordinates that feel no force."""
         active = active_coordinates(matrix)
-        right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
-        if len(active) == 0:
-            return cls(np.zeros(0, dtype=np.complex128), right, left, axes)
         inner = matrix[active][:, active].toarray()
-        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-        order = np.lexsort((values.imag, values.real))
-        right[active], left[active] = x[:, order], y[:, order]
-        return cls(values[order], right, left, axes)
+        values, left, right = eig(inner, left=True, overwrite_a=True, check_finite=False)
+        modes = cls(values, right, left, axes).chosen(np.lexsort((values.imag, values.real)))
+        return modes.placed(active, matrix.shape[0])
 
     @classmethod
     def joined(cls, parts: Sequence["Modes"]) -> "Modes":

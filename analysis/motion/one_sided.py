@@ -92,27 +92,23 @@ class OneSidedSystem:
     """
 
     def __init__(self, motion: Motion) -> None:
-        c, active = motion.configuration, motion.active
-        contacts, size = c.contacts, len(active)
-        self.motion, self.configuration = motion, c
+        self.motion, self.configuration = motion, motion.configuration
+        c, size, (rates, forces) = motion.configuration, len(motion.active), rescaling_operators(motion.configuration)
         self.stable_step = float(stable_timestep(c)) if size else 1.0
-        self.weight = csr_array((1 / motion.root_mass, (active, np.arange(size))), shape=(c.coordinates, size))
-        back = csr_array(self.weight.T)
+        self.weight = csr_array((1 / motion.root_mass, (motion.active, np.arange(size))), shape=(c.coordinates, size))
+        back, s, changes = csr_array(self.weight.T), sliders_of(c), ContactChanges.of(c)
         self.residual_force = np.asarray(back @ c.coordinate_force[:, None])
         self._stiffness, self._damping = fast(motion.stiffness), fast(motion.damping)
-        s = sliders_of(c)
         self.grip, self.excess = fast(back @ s.force), fast(s.excess @ self.weight)
         self.viscous_excess = fast(s.viscous_excess @ self.weight * float(motion.dissipative))
         self._rectified, self._viscous = s.rectified[:, None], s.viscous[:, None]
-        two, bound = np.flatnonzero(contacts.two_derivatives), s.contact
-        rates, forces = rescaling_operators(c)
+        two = np.flatnonzero(c.contacts.two_derivatives)
         self.rates, self.wear = fast(rates[two] @ self.weight), fast(back @ forces[:, two])
-        self._worn = fast(csr_array((bound[:, None] == two).astype(float)))  # shape (B, R)
-        changes = ContactChanges.of(c)
-        rows, viscous = fast(changes.rows @ self.weight), fast(changes.viscous @ self.weight)
+        self._worn = fast(csr_array((s.contact[:, None] == two).astype(float)))  # shape (B, R)
+        rows, viscous = (fast(each @ self.weight) for each in (changes.rows, changes.viscous))
         self.changes = replace(changes, rows=rows, viscous=viscous)
-        bears = contacts.friction - np.linalg.norm(contacts.tangential_force, axis=1)
-        self.missing = np.maximum(bears, 0.0)[bound, None]
+        bears = c.contacts.friction - np.linalg.norm(c.contacts.tangential_force, axis=1)
+        self.missing = np.maximum(bears, 0.0)[s.contact, None]
         whole = self.weight if c.constraint is None else c.constraint @ self.weight
         self._translations = fast(csr_array(whole)[: c.dimension * len(c)])
 
@@ -164,9 +160,7 @@ class OneSidedSystem:
         if len(state.r):
             force += self.wear @ state.r
         if len(state.p):
-            springs = self.excess @ state.z
-            if len(state.r):
-                springs += self._rectified * (self._worn @ state.r)
+            springs = self.excess @ state.z + self._rectified * (self._worn @ state.r)
             whole = springs + self.viscous_excess @ state.v
             np.maximum(state.p, np.where(self._viscous, whole, springs), out=state.p)
             force -= self.grip @ np.maximum(state.p, whole)

@@ -140,8 +140,9 @@ def stable_timestep(
         damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
     found = _limit(scale, stiffness, damping)
+    k, g = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
     # rounding may take the limit below the bound where the two are the same
-    return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
+    return StableTimestep(found, found.error, min(float(found), 4.0 / (g + float(np.sqrt(g**2 + 4 * k)))))
 
 
 def rayleigh_timestep(configuration: Configuration) -> float | None:
@@ -179,27 +180,17 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     return float(np.pi * travel[configuration.free].min() / (0.1631 * nu + 0.8766))
 
 
-def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
-    """Upper bound of mu by the largest sums of rows, 1 / time."""
-    k, c = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
-    return 0.5 * (c + float(np.sqrt(c**2 + 4 * k)))
-
-
 def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
     """2/mu by the largest eigenvalue: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
-    if damping is None:
-        value, _, error = _largest_eigenvalue(scale, stiffness, TIMESTEP_TOLERANCE)
-        step = 2.0 / float(np.sqrt(value))
-        return StableTimestep(step, 0.5 * step * error)
     mu, error, change = 0.0, 0.0, np.inf
     for k in range(7):
-        # a rough mu of K alone is where the steps begin
-        tolerance = TIMESTEP_TOLERANCE if k else 0.1
-        value, moved, error = _largest_eigenvalue(scale, csr_array(stiffness + mu * damping), tolerance)
-        slope = float(moved @ (damping @ moved))
+        rough = damping is not None and k == 0  # a rough mu of K alone is where the steps begin
+        matrix = stiffness if damping is None else csr_array(stiffness + mu * damping)
+        value, moved, error = _largest_eigenvalue(scale, matrix, 0.1 if rough else TIMESTEP_TOLERANCE)
+        slope = 0.0 if damping is None else float(moved @ (damping @ moved))
         before, mu = mu, 0.5 * (slope + float(np.sqrt(slope**2 + 4 * abs(value - slope * mu))))
-        change = abs(mu - before) / mu
-        if k and change <= max(error, TIMESTEP_TOLERANCE):
+        change = 0.0 if damping is None else abs(mu - before) / mu
+        if not rough and change <= max(error, TIMESTEP_TOLERANCE):
             break
     return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * error + change))
 
