@@ -227,7 +227,7 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
             "on, or where the packing is slower than that: give more time"
         )
     span, (one, *others) = _of_starts(system, windows)
-    whole: Window = tuple(map(sum, zip(*span, strict=True)))
+    whole: Window = tuple(sum(each) for each in zip(*span, strict=True))
     return whole, {**one, "time": now, "span": whole[0], "other_start": others[0] if others else None}
 
 
@@ -266,7 +266,7 @@ def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> I
 
 def means_of_windows(system: OneSidedSystem, windows: list[Window]) -> Floats:
     """Root mean squares over particles and axes, of a span of windows, shape (2, S)."""
-    time, moved, _, _, velocities, squares = map(sum, zip(*windows, strict=True))
+    time, moved, _, _, velocities, squares = (sum(each) for each in zip(*windows, strict=True))
     left = np.maximum(squares / time - (velocities / time) ** 2, 0.0)
     return np.sqrt(np.mean([(system.displacement(moved) / time) ** 2, left], axis=(1, 2)))
 

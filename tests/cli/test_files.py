@@ -227,26 +227,6 @@ def test_tables_of_the_program_are_known_by_their_first_line(tmp_path):
     assert (tmp_path / "a.csv").read_text() == "x,z\n1,3\n"
 
 
-@pytest.mark.slow
-def test_the_folder_of_a_search_keeps_what_others_have_put_there(faultgouge_here, tmp_path):
-    """Nor do links lead out of it; what a search has left goes."""
-    (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 6e-3, "until": 0.024}}))
-    left = tmp_path / "o.json.slices"
-    (left / "0123456789abcdef").mkdir(parents=True)
-    (left / "fedcba9876543210").mkdir()
-    own = [left / "thesis.tex", left / "0123456789abcdef" / "mine.npz", left / "fedcba9876543210" / "1-2.npz"]
-    others = [left / "0123456789abcdef" / name for name in ("taken", "shifts.npz", "0-7.npz", f"{'a' * 32}.new")]
-    for path in (*own, *others):
-        path.write_text("x")
-    faultgouge_here("onset", "scene.toml", "-o", "o.json")
-    assert {path for path in left.rglob("*") if path.is_file()} == set(own)
-    for path in own:
-        path.unlink()
-    (left / "0123456789abcdef" / "taken").write_text("")
-    faultgouge_here("onset", "scene.toml", "-o", "o.json")
-    assert not (left / "0123456789abcdef").exists()
-
-
 def test_a_file_is_on_the_storage_device_before_it_has_its_name(tmp_path, monkeypatch):
     """The file first, then its name, then the folder that has the name."""
     happened = []

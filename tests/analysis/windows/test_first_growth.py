@@ -5,7 +5,6 @@ import pytest
 from families import OTHERS, with_dissipation
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array
-from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis.progress import show_progress
@@ -60,14 +59,6 @@ def test_the_window_is_that_among_all_modes(path, search, kind):
     assert found.frequency == pytest.approx(expected.frequency, rel=1e-8)
     assert found.kind == expected.kind == "hopf"
     assert found.error < 1e-9
-
-
-@pytest.mark.long
-def test_a_search_goes_on_to_the_bit_on_two_ranks(search, tmp_path):
-    expected = search("weak", PASSING)()
-    cut_off(search("weak", PASSING), 8, tmp_path)
-    for each in on_ranks(2, lambda mine: search("weak", PASSING)(ranks=mine, folder=tmp_path)):
-        assert each.result() == expected
 
 
 @pytest.mark.slow

@@ -101,7 +101,7 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
     search = SlicedSearch(lambda fx: None)
 
     def basis(operator):
-        (part,) = search._bases(System(0.0, operator), [])
+        (part,) = search._bases(System(0.0, operator))
         return part
 
     first = basis(matrix)
