@@ -131,7 +131,8 @@ class Modes:
     @property
     def rotation(self) -> Floats:
         """Share of rotation in the kinetic energy of each mode, shape (k,)."""
-        return rotation_share(self.right, self.axes)
+        energy = (np.abs(self.right) ** 2).reshape(self.axes, len(self.right) // self.axes, len(self)).sum(axis=1)
+        return np.asarray(energy[self.axes // 2 + self.axes % 2 :].sum(axis=0) / energy.sum(axis=0))
 
 
 def normal_modes(packing: HasConfiguration) -> Modes:
@@ -210,9 +211,3 @@ def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     """
     energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
-
-
-def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
-    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=1)
-    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)

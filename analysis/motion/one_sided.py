@@ -233,10 +233,8 @@ def follow(
             if k % every == 0 or k == count:
                 seen.append([each.copy() for each in (state.z, state.v, state.p, state.r)])
         z, v, p, r = (np.hstack(each) for each in zip(*seen, strict=True))
-        size, first, energy = (
-            each.reshape(len(seen), -1)
-            for each in (system.mean_square_displacement(z), system.changes.first(z, v, p, r), np.sum(v**2, axis=0))
-        )
+        looks = system.mean_square_displacement(z), system.changes.first(z, v, p, r), np.sum(v**2, axis=0)
+        size, first, energy = (each.reshape(len(seen), -1) for each in looks)
         at = first.argmin(axis=0), np.arange(size.shape[1])
         row = energy.mean(axis=0), size.max(axis=0), first[at], size[at], state.p.copy(), state.r.copy()
         rows.append((state.time, *row))
@@ -285,11 +283,9 @@ class OneSidedMotion:
 
 
 def one_sided_motion(
-    packing: HasConfiguration,
-    velocity: ArrayLike | None = None,
-    rise: str | ArrayLike | None = None,
+    packing: HasConfiguration, velocity: ArrayLike | None = None, rise: str | ArrayLike | None = None,
     times: ArrayLike = (0.0,),
-) -> OneSidedMotion:
+) -> OneSidedMotion:  # fmt: skip
     """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
 
     Parameters
@@ -318,7 +314,7 @@ def one_sided_motion(
     if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
         raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
     system = OneSidedSystem.of(packing)
-    c, active, dissipative = system.configuration, system.motion.active, system.motion.dissipative
+    c, motion = system.configuration, system.motion
     push = _on_all_coordinates(c, "velocity", velocity)
     load = np.zeros_like(push) if rise is None else forces_on_coordinates(c, rise)
     pull = np.asarray(system.weight.T @ load)
@@ -327,9 +323,9 @@ def one_sided_motion(
         beginning = next(follow(system, push, end, pull, beside=True))
         least, most = least_scale(beginning), float(beginning.first[:, 0].min())
     flies = c.coordinate_free.copy()
-    flies[active] = False
+    flies[motion.active] = False
     free = np.array([push, load / c.coordinate_mass[:, None]]) * flies[:, None]
-    drag = c.drag_rate if dissipative else 0.0
+    drag = c.drag_rate if motion.dissipative else 0.0
     flight = np.array([[0, 1, 0, 0], [0, -drag, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]])  # of x, v, t g and g
     state, seen = system.start(push), []
     for each in time:

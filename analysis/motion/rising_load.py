@@ -70,6 +70,7 @@ DRAG = 20.0
 VIBRATION_SHARE = 0.05
 """Vibration over drift above which a packing vibrates, and below which it follows the load."""
 
+NUMBERS = "drift", "vibration", "drift_error", "vibration_error", "steady"
 EVENTS = "reaches Coulomb's bound", "opens", "closes", "at Coulomb's bound turns its force", "slides back"
 
 
@@ -135,7 +136,7 @@ def motion_under_load(
     else:
         paths, slid = np.abs(system.rates @ velocity), np.zeros((0, 1))
         solved = float(np.sqrt(np.mean(system.displacement(velocity) ** 2)))
-        found = {"drift": solved, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0, "steady": True}
+        found = dict(zip(NUMBERS, (solved, 0.0, 0.0, 0.0, True), strict=True))
         found |= dict.fromkeys(("time", "span", "other_start"))
     counts = slid > 0.1 * slid.max(initial=0.0)
     reached = float((system.missing[counts] / slid[counts]).max(initial=0.0))
@@ -143,9 +144,7 @@ def motion_under_load(
     drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
     least = max(reached, PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0)
     if change is not None and least >= change:
-        what = (
-            "contacts that count as at Coulomb's bound reach it" if reached == least else "residual forces count less"
-        )
+        what = "contacts counted as at Coulomb's bound reach it" if reached == least else "residual forces count less"
         raise NotFollowedError(
             f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
             "bring the packing to rest more closely"
@@ -284,10 +283,8 @@ def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Wind
             steady = bool(vanishes if follows else abs(late - before) <= differs * late)
             # of the mean of four, doubled, since quarters of a slow cycle are not independent
             spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0])  # and of time steps
-            numbers = drift, vibration, *(spread if np.all(np.isfinite(parts)) else (None, None))
-            names = "drift", "vibration", "drift_error", "vibration_error"
-            told = {name: None if each is None else float(each) for name, each in zip(names, numbers, strict=True)}
-            found.append(FieldsByName(**told, steady=steady))
+            errors = spread.tolist() if np.all(np.isfinite(parts)) else [None, None]
+            found.append(FieldsByName(zip(NUMBERS, [*parts[0].tolist(), *errors, steady], strict=True)))
         if all(each.steady for each in found):
             break
     return span, found

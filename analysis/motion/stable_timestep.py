@@ -45,8 +45,6 @@ sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
 The step 2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
-from typing import Literal
-
 import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
@@ -89,20 +87,14 @@ class StableTimestep(float):
         return made
 
 
-DashpotVelocity = Literal["half-step", "extrapolated"]
-"""The velocity that dashpots feel."""
-
-DASHPOT_WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
-"""c, the weight of dashpots in the limit."""
-
-
 def stable_timestep(
     of: float | HasConfiguration,
     stiffness: csr_array | None = None,
     damping: csr_array | None = None,
-    dashpot_velocity: DashpotVelocity | None = None,
 ) -> StableTimestep:
-    r"""The largest stable time step of velocity Verlet.
+    """The largest stable time step of velocity Verlet.
+
+    Dashpots of this package's law feel the extrapolated velocity, all others that of the half step, as in LAMMPS.
 
     Parameters
     ----------
@@ -110,9 +102,6 @@ def stable_timestep(
         omega_max, radian / time, or a configuration with its dashpots.
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
-    dashpot_velocity : {"half-step", "extrapolated"}, optional
-        The velocity that dashpots feel; by default "extrapolated" for the law of this package, and "half-step", as in
-        LAMMPS's own styles, for all others.
 
     Returns
     -------
@@ -133,11 +122,10 @@ def stable_timestep(
     if not stiffness.nnz:
         return StableTimestep(np.inf)
     c = of.configuration.contacts
-    ours = len(c) > 0 and not c.viscous_slider.any()
     if damping is None and of.damped:
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
-    if damping is not None:
-        damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
+    if damping is not None and len(c) and not c.viscous_slider.any():  # the law of this package: c = 2
+        damping = 2.0 * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
     found = _limit(scale, stiffness, damping)
     k, g = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
