@@ -68,19 +68,6 @@ def test_vectors_are_those_of_lapack():
         assert marked.overlap[k] == pytest.approx(abs(left[:, same].conj() @ right[:, same]), rel=1e-5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("copies", "others", "sizes"),
-    [(5, 300, SMALL), pytest.param(20, 300, SMALL, marks=pytest.mark.long), (20, 150, {})],
-)
-def test_more_equal_eigenvalues_than_a_block_has_vectors(copies, others, sizes):
-    """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
-    rng = np.random.default_rng(copies)
-    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, others)])
-    found, _ = all_eigenvalues(turned(real, rng), **sizes)
-    np.testing.assert_allclose(found.real, np.sort(real), rtol=0, atol=1e-6)
-
-
 @pytest.mark.parametrize("copies", [3, 40])
 def test_identical_cells_that_do_not_touch_have_each_their_eigenvalues(copies):
     """More equal ones than any block has vectors, with pairs and negative ones, beside a large island."""

@@ -5,7 +5,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from families import DIGITS, crossing, normal_form
+from families import DIGITS, crossing, normal_form, then_jumping
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from tiling import tile
@@ -133,17 +133,6 @@ def test_first_window_of_hundreds_of_disks(path):
     assert max(np.abs(before.imag).max(), np.abs(below.imag).max()) < 1e-4
     (above,) = (value for value in above if value.imag > 1e-4)
     assert above.real == pytest.approx(window.eigenvalue, abs=1e-2)
-
-
-def then_jumping(f):
-    """A window of two levels, and a jump to another one, which takes bisection, and divided increments."""
-    return crossing(0.6, -0.01)(f) if f < 1.1 else crossing(1.2, -0.04)(f)
-
-
-def test_a_window_that_begins_with_a_jump_inside_an_increment_is_found():
-    """The pair is real at both ends; the discriminant jumps below zero at 1.1."""
-    window = complex_windows(then_jumping, [0.0, 0.5, 1.0, 1.5])[-1]
-    assert (window.fx_onset, window.fx_end) == pytest.approx((1.1, 1.4), abs=1e-8)
 
 
 @pytest.mark.parametrize("search", [complex_windows, searched])
