@@ -20,15 +20,14 @@ The eigenvectors of slices take most of the time, and one slice needs nothing of
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import chain, pairwise
-from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csc_array, csr_array
 
 from ..arrays import Floats, Indices
-from ..errors import FaultgougeError, NoEquilibriumError
+from ..errors import NoEquilibriumError
 from ..factors.lanczos import Slice
 from ..progress import report_progress
 from .edges import DoubtError
@@ -36,22 +35,31 @@ from .motions import Motions, System
 from .onset import Increments, Window
 from .quiet import Quiet
 from .search import Search
-from .slices import (
-    ALONE,
-    LIMITS,
-    Candidate,
-    Limits,
-    Ranks,
-    SliceResult,
-    keep_result,
-    kept_results,
-    results_folder,
-    slices,
-)
+from .slices import ALONE, LIMITS, Limits, Ranks, slices
 
 
-class LostPairError(FaultgougeError):
-    """A motion cannot be followed to another load; the text is one sentence."""
+class Candidate(NamedTuple):
+    """A motion that begins to grow in its slice.
+
+    Attributes
+    ----------
+    increment : int
+        On which of the increments between some loads.
+    onset, inside : float
+        The load from which on it grows, and one at which it still does; force per top disk.
+    value, slope : complex
+        lambda, or s with dissipation, at the load `inside`, and its change over the load.
+    """
+
+    increment: int
+    onset: float
+    inside: float
+    value: complex
+    slope: complex
+
+
+class _LostError(Exception):
+    """A motion cannot be followed to another load."""
 
 
 class SlicedSearch:
@@ -61,14 +69,12 @@ class SlicedSearch:
     ----------
     at : callable
         Load -> System.
-    ranks, folder, limits
+    ranks, limits
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
-    def __init__(
-        self, at: Callable[[float], System], ranks: Ranks = ALONE, folder: Path | None = None, limits: Limits = LIMITS
-    ) -> None:
-        self.at, self.ranks, self.folder, self.limits = at, ranks, folder, limits
+    def __init__(self, at: Callable[[float], System], ranks: Ranks = ALONE, limits: Limits = LIMITS) -> None:
+        self.at, self.ranks, self.limits = at, ranks, limits
         self.doubtful: list[tuple[float, float]] = []
         self.passed: list[System] = []
         self.crowded = False
@@ -125,39 +131,34 @@ class SlicedSearch:
     ) -> tuple[Window | None, bool]:
         """The first window of the system itself among those announced, and whether it is in doubt.
 
-        On the finest increments the search goes on at a doubt, and raises the error behind it if it finds no window.
+        On the finest increments the search goes on at a doubt, and raises the error behind it if it finds no window. A
+        motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
+        passed.
         """
         off, first, doubt = 2 * self.limits.reach * (there.fx - here.fx), None, False
-        lost: FaultgougeError | None = None
+        places = [there, *(each for each in reversed(self.passed) if each.fx <= here.fx)]
+        missing: NoEquilibriumError | None = None
         for candidate in candidates:
             if first is not None and candidate.onset > first.fx_onset + off:
                 break
             report_progress(f"a motion that may grow from about F_x = {candidate.onset:.6g}: its onset")
+            window: Window | None = None
             try:
-                window = self._confirm(candidate, here, there)
-            except (NoEquilibriumError, LostPairError) as error:
-                window, doubt, lost = None, True, error
+                for above, below in pairwise(places):
+                    window = next(iter(self._windows_near(candidate, below, above)), None)
+                    if window is None or window.kind != "start":
+                        break
+            except (NoEquilibriumError, _LostError) as error:
+                window, doubt = None, True
+                missing = error if isinstance(error, NoEquilibriumError) else missing
             if window is not None and (first is None or window.fx_onset < first.fx_onset):
                 doubt = doubt or (window.fx_onset > here.fx and abs(window.fx_onset - candidate.onset) > off)
                 first = window
             if doubt and not finest:
                 break
-        if finest and first is None and isinstance(lost, NoEquilibriumError):
-            raise lost
+        if finest and first is None and missing is not None:
+            raise missing
         return first, doubt
-
-    def _confirm(self, candidate: Candidate, here: System, there: System) -> Window | None:
-        """The first window of the system itself next to an announced one; None if there is none.
-
-        A motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
-        passed.
-        """
-        places = [*(each for each in self.passed if each.fx <= here.fx), there]
-        for k in range(len(places) - 2, -1, -1):
-            windows = self._windows_near(candidate, places[k], places[k + 1])
-            if not windows or windows[0].kind != "start" or k == 0:
-                return windows[0] if windows else None
-        return None
 
     def _windows_near(self, candidate: Candidate, here: System, there: System) -> Sequence[Window]:
         """The windows of the few motions next to an announced one."""
@@ -174,12 +175,7 @@ class SlicedSearch:
             return below, above
 
         def lost(system: System) -> NoReturn:
-            pair = f"the pair of eigenvalues about {candidate.value.real:.6g}"
-            what = pair if system.damping is None else f"a motion of the frequency {candidate.value.imag:.6g}"
-            raise LostPairError(
-                f"{what} cannot be told from its neighbours between F_x = {here.fx:.10g} and {there.fx:.10g}: take "
-                "smaller increments"
-            )
+            raise _LostError
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
@@ -188,46 +184,33 @@ class SlicedSearch:
         return found
 
     def _announced(self, places: Sequence[System]) -> list[Candidate]:
-        """The motions that slices announce, of all ranks, and those that a search that was cut off has left."""
-        count, folder = len(places[0].active), None
-        if self.folder is not None and not self._keeps(places[0]):  # later increments need bases that are kept
-            folder = results_folder(self.folder, places, self.limits)
-        root = self.ranks.rank == 0
-        stored = self.ranks.together(lambda: kept_results(folder) if folder is not None and root else [])[0]
-        before = sum(each.border.size for each in stored)
+        """The motions that slices announce, of all ranks."""
+        own = self.ranks.part(len(places[0].active))
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        report_progress(f"{where}: {before} of {count} modes are known")
+        report_progress(f"{where}: counting modes")
 
-        def search_slices() -> list[SliceResult]:
-            """Those of this rank."""
-            found: list[SliceResult] = []
-            done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
-            failure: FaultgougeError | None = None
-            for basis in self._bases(places[0], stored):
+        def search_slices() -> tuple[list[Candidate], bool]:
+            """Of this rank's slices, and whether one is crowded."""
+            found, done, crowded = list[Candidate](), 0, False
+            for basis in self._bases(places[0]):
                 done += basis.own.stop - basis.own.start
-                report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
-                try:
-                    found.append(self._search_slice(basis, places))
-                except FaultgougeError as error:
-                    failure = failure or error  # it waits: the ranks meet at the end of their bases
-                    continue
-                if folder is not None:
-                    keep_result(folder, found[-1])
-            if failure is not None:
-                raise failure
-            return found
+                report_progress(f"{where}: {done} of {own.stop - own.start} modes")
+                candidates, full = self._search_slice(basis, places)
+                found, crowded = found + candidates, crowded or full
+            return found, crowded
 
-        every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
-        self.crowded = self.crowded or any(each.crowded for each in every)
-        return [candidate for each in every for candidate in each.candidates]
+        every = self.ranks.together(search_slices)
+        self.crowded = self.crowded or any(crowded for _, crowded in every)
+        return list(chain.from_iterable(found for found, _ in every))
 
-    def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
-        """The windows of the small families between the loads, of one slice's own motions."""
+    def _search_slice(self, basis: Slice, places: Sequence[System]) -> tuple[list[Candidate], bool]:
+        """Which of one slice's own motions begin to grow between the loads, and whether dashpots couple more of its
+        motions than a slice can hold."""
         blocks = [reduce_system(basis.vectors, each, places[0].active) for each in places]
         damped = len(blocks[0]) == 2
         if not damped and len(blocks[0][0]) < len(places[0].active):
             blocks = [[_with_larger_feed(block, self.limits.excess)] for (block,) in blocks]
-        quiet, found = Quiet(Motions.of), []
+        quiet, found = Quiet(), []
         own, spacing = basis.values[basis.own], basis.border.spacing
         for k, (here, there) in enumerate(pairwise(places)):
             span = there.fx - here.fx
@@ -251,34 +234,29 @@ class SlicedSearch:
                     j = growing[np.argmin(np.abs(apart.imag if damped else apart.real))]
                     slope = state.slopes(small(here.fx if inside > here.fx else last))[j]
                     found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
-        return SliceResult(basis.border, found, quiet.crowded)
+        return found, quiet.crowded
 
-    def _keeps(self, place: System) -> bool:
-        """Whether there is memory for the bases of all modes."""
-        count = len(place.active)
-        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
-        return (count + margins) * count <= self.limits.largest_basis
-
-    def _bases(self, place: System, stored: Sequence[SliceResult]) -> Iterator[Slice]:
+    def _bases(self, place: System) -> Iterator[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
         mine = [_mixing(each, place) for each in self._kept]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
             yield from self._kept
             return
-        self._kept, keeps = [], self._keeps(place)  # its memory is free before that for the next ones is taken
+        self._kept = []  # its memory is free before that for the next ones is taken
         matrix = csr_array(place.inner[0])
         symmetric, count = csc_array(0.5 * (matrix + matrix.T)), len(place.active)
         bases: Iterator[Slice] = iter(())
         if count > self.limits.one_basis:
-            borders = [each.border for each in stored]
-            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks, known=borders)
-        elif self.ranks.rank == 0 and not stored:  # a small operator has one
+            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks)
+        elif self.ranks.rank == 0:  # a small operator has one
             values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
             bases = iter([Slice(0, values, vectors, slice(0, count))])
-        if keeps:
-            self._kept = list(bases)
-        yield from self._kept if keeps else bases
+        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
+        if (count + margins) * count <= self.limits.largest_basis:
+            bases = iter(kept := list(bases))
+            self._kept = kept
+        yield from bases
 
 
 def reduce_system(vectors: Floats, system: System, active: Indices) -> list[Floats]:
