@@ -82,6 +82,7 @@ def onset_run(
     near_onset: Floats | None = None,
     bed: Packing | None = None,
     watch: Watch | None = None,
+    folder: Path | None = None,
 ) -> Onset:
     """Ramp a scene for one friction coefficient and find the onset.
 
@@ -107,6 +108,9 @@ def onset_run(
         As in :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
         Told in words what is under way.
+    folder : Path, optional
+        Folder in which the search of a large packing stores its slices, and from which the search continues, see
+        :func:`~faultgouge.analysis.find_onset`.
 
     Raises
     ------
@@ -137,7 +141,7 @@ def onset_run(
                     reached(equilibrium)
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-        search = partial(find_onset, dissipation=dissipation, first=first)
+        search = partial(find_onset, dissipation=dissipation, first=first, folder=folder)
         try:
             found = search(lambda fx: with_dashpots(path(fx)), forces, ranks=search_ranks())
         except TurningPointError:

@@ -80,6 +80,11 @@ class Border(NamedTuple):
     beyond: float
     spacing: float
 
+    @property
+    def size(self) -> int:
+        """Number of modes in the slice."""
+        return self.modes[1] - self.modes[0]
+
 
 @dataclass(frozen=True, eq=False)
 class Slice:

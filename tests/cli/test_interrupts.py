@@ -160,6 +160,31 @@ def test_an_import_says_that_its_file_is_written(tmp_path):
     assert errors.strip().endswith(f"Error: interrupted: {says}")
 
 
+LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {"step": 4e-4, "until": 0.02}}
+
+
+@pytest.mark.long
+def test_a_long_search_goes_on_to_the_bit(faultgouge, tmp_path):
+    """Killed, interrupted and continued on one process; and in one piece."""
+    (tmp_path / "settle.toml").write_text(toml(LARGE))
+    faultgouge("settle", "settle.toml")
+    onset = CommandToKill("onset scene.toml -o onset.json", toml(LARGE | {"packing": {"file": "run.h5"}}))
+    slices = tmp_path / "onset.json.slices"
+
+    def known():
+        return len(list(slices.glob("*/*-*.npz")))
+
+    interrupted(start_command(onset, tmp_path), signal.SIGKILL, lambda: known() >= 10, group=True)
+    first = known()
+    errors = interrupted(start_command(onset, tmp_path), signal.SIGINT, lambda: known() >= first + 10)
+    says = "Error: interrupted: onset.json.slices has what was found so far; the same command continues from there."
+    assert errors.splitlines()[-1] == says
+    faultgouge(*onset.command.split())
+    assert not slices.exists()
+    faultgouge("onset", "scene.toml", "-o", "whole.json")
+    assert (tmp_path / "onset.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
+
+
 IN_A_LIBRARY = """
 from faultgouge.signal_guard import guarded, keeps
 

@@ -9,7 +9,7 @@ from typer import Option
 
 from ..analysis.counted import counted
 from ..analysis.table_display import table_of
-from ..signal_guard import is_root
+from ..signal_guard import is_root, keeps
 from .terminal import LAYER, Results, SceneFile, command, report_fallback, say, status, working
 
 if TYPE_CHECKING:
@@ -41,13 +41,15 @@ def onset(
     if every and (disks := scene.packing.disks) > LIMITS.all_windows:
         takes = f"--all finds all windows of up to {LIMITS.all_windows} disks"
         raise BadInputError(f"{takes}, and the packing has {disks}: leave --all out for the first window")
+    # a long search leaves what it finds beside its file, unless that is a device
+    folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
     with working("settling"):
         bed = shared_bed(scene)
     found: list[dict[str, Any]] = []
     failed: Exception | None = None
     for mu in scene.law.mus:
         try:
-            each = _search(scene, mu, not every, bed)
+            each = _search(scene, mu, not every, bed, folder)
             yield from _in_words(each)
             si = {}
             if (real := real_units(scene)) is not None:
@@ -73,19 +75,25 @@ def onset(
         if output and is_root():
             write_json(output, result)
         yield result
+        if is_root() and folder is not None:
+            remove_results(folder)  # the result is there
     if first is None and failed is not None:
         raise failed
 
 
-def _search(scene: Scene, mu: float, first: bool, bed: Any) -> Onset:
+def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None) -> Onset:
     """Search for one friction coefficient, and say what is doubtful."""
     from faultgouge.pywrap.onset import onset_run
 
     dissipation = scene.damping is not None
     with status(f"mu = {mu:g}") as show:
-        found = onset_run(
-            scene, mu, dissipation=dissipation, first=first, bed=bed, watch=lambda now: show(f"mu = {mu:g}: {now}")
-        )
+
+        def watch(now: str) -> None:
+            show(f"mu = {mu:g}: {now}")
+            if folder is not None and folder.is_dir():
+                keeps(f"{folder} has what was found so far; the same command continues from there")
+
+        found = onset_run(scene, mu, dissipation=dissipation, first=first, bed=bed, watch=watch, folder=folder)
     for equilibrium in found.equilibria:
         report_fallback(equilibrium)
     expected = "a motion was expected to grow" if dissipation else "a pair was expected to become complex"
