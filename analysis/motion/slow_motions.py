@@ -93,7 +93,7 @@ def slow_motions(a: csr_array, g: csr_array, kept: csr_array, reference: float, 
 
     spaces = []
     for operator in (inverse, inverse_transposed):
-        space = BlockKrylov(operator, np.random.default_rng(0).standard_normal((6, 2 * size)), min(KRYLOV, size))
+        space = BlockKrylov(operator, np.random.default_rng(0).standard_normal((6, 2 * size)), min(KRYLOV, 2 * size))
         space.extend(space.most)
         values, vectors = eig(space.square)
         order = np.argsort(-np.abs(values))
