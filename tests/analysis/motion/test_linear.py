@@ -243,14 +243,14 @@ def test_the_slowest_motions_are_those_of_lapack_and_others_stay_in_a_state():
         found = slow_motions(a, g, csr_array(np.eye(size)), top, drifts)
         if found is None:
             continue
-        times += 1
-        for each, error in zip(found.s, found.error, strict=True):
+        times, (values, errors, leave) = times + 1, found
+        for each, error in zip(values, errors, strict=True):
             assert np.abs(s - each).min() <= error + 1e-11 * top
-        known = 2 * drifts + len(found.s)
+        known = 2 * drifts + len(values)
         if not drifts:  # of a double zero LAPACK has no vectors
             vectors = vectors[:, np.argsort(np.abs(s - 0.1 * top))].real
-            np.testing.assert_allclose(found.leave(vectors[:, :known]), 0, atol=4e-5)
-            np.testing.assert_allclose(found.leave(vectors[:, known:]), vectors[:, known:], atol=4e-5)
+            np.testing.assert_allclose(leave(vectors[:, :known]), 0, atol=4e-5)
+            np.testing.assert_allclose(leave(vectors[:, known:]), vectors[:, known:], atol=4e-5)
     assert times >= 5
 
 
