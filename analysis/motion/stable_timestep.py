@@ -55,7 +55,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from ..arrays import derive_frozen
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
 
@@ -138,7 +138,7 @@ def stable_timestep(
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
     if damping is not None:
         damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
-    scale = 1.0 / np.sqrt(coordinate_mass(of))
+    scale = 1.0 / np.sqrt(of.coordinate_mass)
     found = _limit(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
     return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
