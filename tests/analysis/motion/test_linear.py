@@ -89,6 +89,14 @@ def test_certificate_against_lapack_on_random_packings(first):
     assert proofs >= 5
 
 
+def test_a_certificate_bounds_fast_motions_that_decay_more_slowly_than_the_slow_ones():
+    """Lone oscillators, of which the fastest has the weakest dashpot: the error reaches up to 2 Re s of that one."""
+    frequency, dashpot = np.linspace(1.0, 10.0, 200), np.linspace(0.3, 0.1, 200)
+    found = prove(csr_array(np.diag(frequency**2)), csr_array(np.diag(dashpot)), 0.0)
+    assert found.stable
+    assert found.growth_rate + found.error >= -0.1 > found.growth_rate + 0.5 * found.error
+
+
 @pytest.fixture
 def beyond_lapack(monkeypatch):
     """As if LAPACK served no packing."""
