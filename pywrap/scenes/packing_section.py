@@ -14,10 +14,7 @@ from ...analysis.arrays import Floats
 from ...analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
-from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence
-
-SPARSEST = 10.0
-"""Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
+from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence, refuse
 
 
 class SettlingLoad(Section):
@@ -91,21 +88,14 @@ class GeneratedPacking(Section):
 
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":
-        if self.top > self.disks:
-            raise refusal_sentence("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
-        cutoff = 2 * max(self.radii)
-        if self.periodic and self.width < 2 * cutoff:
-            says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
-            raise refusal_sentence("width", says)
-        row = 2 * self.disks * max(self.radii)
-        if self.width > SPARSEST * row:
-            says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
-            raise refusal_sentence("width", says)
-        if not self.periodic and (self.top < self.disks or row > self.width):
-            says = (
-                "= false leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
-            )
-            raise refusal_sentence("periodic", says)
+        says = f"= {self.top} is more than the {self.disks} disks of the packing: lower it"
+        refuse(self.top > self.disks, "top", says)
+        cutoff, row = 2 * max(self.radii), 2 * self.disks * max(self.radii)
+        says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
+        refuse(self.periodic and self.width < 2 * cutoff, "width", says)
+        open_ = not self.periodic and (self.top < self.disks or row > self.width)
+        says = "leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
+        refuse(open_, "periodic", f"= false {says}")
         return self
 
     def start(self, draw: int = 0) -> Disks:

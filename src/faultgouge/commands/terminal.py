@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import wraps
 from math import isfinite
 from pathlib import Path
@@ -67,17 +68,6 @@ def refuse_scene(file: Path) -> Path:
     return file
 
 
-def one_of(*known: str) -> Callable[[str | None], str | None]:
-    """A check of an option that takes a few words."""
-
-    def check(word: str | None) -> str | None:
-        if word not in (None, *known):
-            raise typer.BadParameter(f"{word} is refused: give {' or '.join(known)}")
-        return word
-
-    return check
-
-
 OF_PACKING = "What `ramp`, `perturb`, `drive` or `import` has written (.h5), or NAME.disks from the dumps of a deck."
 PackingFile = Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback=refuse_scene)]
 
@@ -85,7 +75,6 @@ PackingFile = Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback
 def command(
     example: str,
     *,
-    name: str | None = None,
     reads: str | None = None,
     writes: str = "",
     kept: str = "",
@@ -101,8 +90,6 @@ def command(
     ----------
     example : str
         Of the help.
-    name : str, optional
-        Of the command; by default that of the function.
     reads : str, optional
         The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
     writes : {"", "file", "new", "run", "folder"}
@@ -128,12 +115,11 @@ def command(
             if reads is not None:
                 given["scene"] = scene = read_scene(given["scene"], reads)
                 inputs += [path for paths in scene.files.values() for path in paths]
-            with ExitStack() as held:
-                if writes and (output := given["output"]) is not None:
-                    held.enter_context(locked(output, *inputs, kind=writes))
-                    if kept:
-                        keeps(kept.format(output=output))
-                speak: Callable[[str], object] = (lambda line: None) if as_json else print_line
+            output = given["output"] if writes else None
+            speak: Callable[[str], object] = (lambda line: None) if as_json else print_line
+            with nullcontext() if output is None else locked(output, *inputs, kind=writes):
+                if kept:
+                    keeps(kept.format(output=output))
                 for result in work(**given):  # type: ignore[call-arg]
                     if isinstance(result, str):
                         speak(result)
@@ -148,8 +134,9 @@ def command(
             parameters.append(flag)
         vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
         run.__annotations__ = {each.name: each.annotation for each in parameters}
-        called = name or work.__name__
-        COMMANDS[called] = CommandInfo(called, callback=run, epilog=f"Example: {example}")
+        called, help_ = work.__name__.rstrip("_"), inspect.getdoc(work) or ""
+        first = " ".join(re.split(r"(?<=[.?])\s", help_)[0].split())  # the overview has it in full
+        COMMANDS[called] = CommandInfo(called, callback=run, short_help=first, epilog=f"Example: {example}")
         return work
 
     return register
@@ -245,10 +232,7 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
     Off a terminal it is a line of the log, every minute. A thread says it: work may be within one call for longer.
     """
-    if not is_root():
-        yield lambda what: None
-        return
-    if sys.stderr.isatty():
+    if is_root() and sys.stderr.isatty():
         from rich.console import Console
 
         with Console(stderr=True).status(what) as line:
