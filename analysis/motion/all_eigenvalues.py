@@ -78,7 +78,7 @@ def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple
         if inner.shape[0] > least:
             found, marked = _in_slices(inner, own)
         else:
-            found, left, right = eig(inner.toarray(), left=True, right=True)
+            found, left, right = eig(inner.toarray(), left=True)
             chosen = _matters(found, np.abs(np.sum(left.conj() * right, axis=0)))
             marked = Modes(found[chosen], right[:, chosen], left[:, chosen])
         values.append(found)
@@ -122,14 +122,13 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
             except SpectrumError:
                 continue
             low, high = borders[k] if k else -np.inf, borders[k + 1] if k + 1 < pieces else np.inf
-            here = (modes.values.real >= low) & (modes.values.real < high)
-            found[k] = every[(every.real >= low) & (every.real < high)], modes.chosen(here)
+            inside, marked = ((low <= each.real) & (each.real < high) for each in (every, modes.values))
+            found[k] = every[inside], modes.chosen(marked)
         values = np.concatenate([each for each, _ in found])
         off = abs(values.sum() - trace), abs((values**2).sum() - square) / (2 * np.abs(values).max(initial=1e-300))
         if len(values) == size and max(off) <= 1e-3 * spacing:
             return values, Modes.joined([modes for _, modes in found]).placed(order, size)
-        lacking = np.array([len(each) for each, _ in found]) - np.diff(edges)
-        todo = np.flatnonzero(lacking < 0) if block == 4 else np.arange(pieces)
+        todo = np.flatnonzero([len(each) for each, _ in found] < np.diff(edges)) if block == 4 else np.arange(pieces)
     why = f"{len(values)} were found" if len(values) != size else f"their sum is off the trace by {max(off):.3g}"
     raise SpectrumError(f"All eigenvalues of {size} coordinates: {why}.")
 
@@ -171,9 +170,7 @@ def eigenvalues_about(
             order = np.argsort(-np.abs(theta), kind="stable")
             with np.errstate(divide="ignore", invalid="ignore"):
                 error = space.residuals(x) / np.abs(theta) ** 2 / np.abs(np.sum(y.conj() * x, axis=0))
-                values = shift + 1 / theta[order]
-            failed = np.flatnonzero(~(error[order] <= accuracy))
-            known = values[: int(failed[0]) if len(failed) else len(values)]
+                known = (shift + 1 / theta[order])[np.logical_and.accumulate(error[order] <= accuracy)]
             distances.append(np.abs(known - shift))
             radii.append(np.inf if len(known) == size else distances[-1].max(initial=0.0))
         height = np.abs(known.imag[(known.real >= low) & (known.real <= high)]).max(initial=0.0)

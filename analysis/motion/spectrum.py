@@ -35,7 +35,7 @@ pair, so that a double real eigenvalue turns into a spurious complex pair of siz
 exactly and for complex :math:`\lambda` too: real eigenvalues below :math:`4/dt^2` neither grow nor decay.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,7 +63,7 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .modes import Mode, Modes, growth_rate, participation_ratio, rotation_share
+from .modes import Mode, Modes, growth_rate
 from .motion import Motion
 from .no_verdict import no_verdict
 
@@ -227,10 +227,10 @@ def eigenvalues(packing: HasConfiguration, form: Form = "consistent") -> Complex
         Sorted by real part, then imaginary part, 1 / time^2. Coordinates that feel no force are left out.
     """
     dense = dynamical_matrix(packing, form)[0].toarray()
-    return _sort_eigenvalues(eigvals(dense.T, overwrite_a=True, check_finite=False) if len(dense) else np.zeros(0))
+    return _sorted(eigvals(dense.T, overwrite_a=True, check_finite=False))
 
 
-def _sort_eigenvalues(values: Complexes | Floats) -> Complexes:
+def _sorted(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
@@ -283,13 +283,12 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     noise = int(np.count_nonzero(marked.values.imag > 0))
     grows = np.flatnonzero(marked.values.imag * overlap > SAFETY * rounding)
-    right = np.zeros((packing.coordinates, len(grows)), dtype=np.complex128)
-    right[active] = marked.right[:, grows]
-    shares = participation_ratio(right, packing.axes).tolist(), rotation_share(right, packing.axes).tolist()
-    pairs = [Mode(*each) for each in zip(marked.values[grows].tolist(), overlap[grows].tolist(), *shares, strict=True)]
+    growing = replace(marked.chosen(grows).placed(active, packing.coordinates), axes=packing.axes)
+    numbers = growing.values, overlap[grows], growing.participation, growing.rotation
+    pairs = [Mode(*each) for each in zip(*(each.tolist() for each in numbers), strict=True)]
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
-        _sort_eigenvalues(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
+        _sorted(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
         rattlers=packing.rattlers, rounding=rounding, free=free, packing=packing,
     )  # fmt: skip
 
@@ -304,12 +303,12 @@ def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tup
         return all_eigenvalues(matrix)
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
-    alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
-    values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
-    doubtful = (values.imag != 0) | (values.real < -rounding) | ((values.real > rounding) & (values.real <= alike))
-    if alone and not doubtful.any():
-        return values, Modes.none(len(dense))
-    values, left, right = eig(dense, left=True, right=True)
+    if len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0:
+        values = eigvals(dense)
+        doubtful = (values.imag != 0) | (values.real < -rounding) | ((values.real > rounding) & (values.real <= alike))
+        if not doubtful.any():
+            return values, Modes.none(len(dense))
+    values, left, right = eig(dense, left=True)
     return values, Modes(values, right, left)
 
 

@@ -45,8 +45,6 @@ sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
 The step 2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
-from typing import Literal
-
 import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
@@ -55,7 +53,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from ..arrays import derive_frozen
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
 
@@ -89,20 +87,14 @@ class StableTimestep(float):
         return made
 
 
-DashpotVelocity = Literal["half-step", "extrapolated"]
-"""The velocity that dashpots feel."""
-
-DASHPOT_WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
-"""c, the weight of dashpots in the limit."""
-
-
 def stable_timestep(
     of: float | HasConfiguration,
     stiffness: csr_array | None = None,
     damping: csr_array | None = None,
-    dashpot_velocity: DashpotVelocity | None = None,
 ) -> StableTimestep:
-    r"""The largest stable time step of velocity Verlet.
+    """The largest stable time step of velocity Verlet.
+
+    Dashpots of this package's law feel the extrapolated velocity, all others that of the half step, as in LAMMPS.
 
     Parameters
     ----------
@@ -110,9 +102,6 @@ def stable_timestep(
         omega_max, radian / time, or a configuration with its dashpots.
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
-    dashpot_velocity : {"half-step", "extrapolated"}, optional
-        The velocity that dashpots feel; by default "extrapolated" for the law of this package, and "half-step", as in
-        LAMMPS's own styles, for all others.
 
     Returns
     -------
@@ -133,15 +122,15 @@ def stable_timestep(
     if not stiffness.nnz:
         return StableTimestep(np.inf)
     c = of.configuration.contacts
-    ours = len(c) > 0 and not c.viscous_slider.any()
     if damping is None and of.damped:
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
-    if damping is not None:
-        damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
-    scale = 1.0 / np.sqrt(coordinate_mass(of))
+    if damping is not None and len(c) and not c.viscous_slider.any():  # the law of this package: c = 2
+        damping = 2.0 * damping
+    scale = 1.0 / np.sqrt(of.coordinate_mass)
     found = _limit(scale, stiffness, damping)
+    k, g = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
     # rounding may take the limit below the bound where the two are the same
-    return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
+    return StableTimestep(found, found.error, min(float(found), 4.0 / (g + float(np.sqrt(g**2 + 4 * k)))))
 
 
 def rayleigh_timestep(configuration: Configuration) -> float | None:
@@ -179,27 +168,17 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     return float(np.pi * travel[configuration.free].min() / (0.1631 * nu + 0.8766))
 
 
-def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
-    """Upper bound of mu by the largest sums of rows, 1 / time."""
-    k, c = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
-    return 0.5 * (c + float(np.sqrt(c**2 + 4 * k)))
-
-
 def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
     """2/mu by the largest eigenvalue: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
-    if damping is None:
-        value, _, error = _largest_eigenvalue(scale, stiffness, TIMESTEP_TOLERANCE)
-        step = 2.0 / float(np.sqrt(value))
-        return StableTimestep(step, 0.5 * step * error)
     mu, error, change = 0.0, 0.0, np.inf
     for k in range(7):
-        # a rough mu of K alone is where the steps begin
-        tolerance = TIMESTEP_TOLERANCE if k else 0.1
-        value, moved, error = _largest_eigenvalue(scale, csr_array(stiffness + mu * damping), tolerance)
-        slope = float(moved @ (damping @ moved))
+        rough = damping is not None and k == 0  # a rough mu of K alone is where the steps begin
+        matrix = stiffness if damping is None else csr_array(stiffness + mu * damping)
+        value, moved, error = _largest_eigenvalue(scale, matrix, 0.1 if rough else TIMESTEP_TOLERANCE)
+        slope = 0.0 if damping is None else float(moved @ (damping @ moved))
         before, mu = mu, 0.5 * (slope + float(np.sqrt(slope**2 + 4 * abs(value - slope * mu))))
-        change = abs(mu - before) / mu
-        if k and change <= max(error, TIMESTEP_TOLERANCE):
+        change = 0.0 if damping is None else abs(mu - before) / mu
+        if not rough and change <= max(error, TIMESTEP_TOLERANCE):
             break
     return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * error + change))
 

@@ -24,7 +24,7 @@ from scipy.sparse import csr_array, diags_array, vstack
 from ..arrays import Floats, Indices
 from ..configuration import Configuration
 from .gaps import gaps_of
-from .linearised_contacts import contact_rows, tangential_rows
+from .linearised_contacts import overlap_rows, tangential_rows
 
 TURN = 0.2
 """Angle, radian, by which the force of a contact at Coulomb's bound may turn: half of it is the share of a sideways
@@ -83,13 +83,12 @@ class ContactChanges:
         size = np.linalg.norm(c.tangential_force, axis=1)
         along = _directions(c.tangential_force, c.normal)
         across = np.cross(c.normal, along)
-        closing = np.hstack([-c.normal, np.zeros_like(c.normal)])
         coupling = 0.5 * (c.closing + c.parting)
         gains = [
             tangential_rows(configuration, each, c.tangential_stiffness, np.einsum("ca,ca->c", coupling, each))
             for each in (along, across)
         ]
-        overlaps = contact_rows(configuration, np.array([closing, -closing]))
+        overlaps = overlap_rows(configuration)
         bears = np.isfinite(c.friction) & (c.friction > 0) & (c.normal_force > 0)
         bound = np.where(bears, c.friction, 0.0)
         slope = np.divide(bound * c.normal_stiffness, c.normal_force, out=np.zeros(len(c)), where=bears)

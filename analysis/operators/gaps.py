@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
+from ..assembly import each_of
 from ..configuration import Configuration
 from ..contacts import WALL
-from .linearised_contacts import particle_rows
 
 SAME_PLANE = 1e-7
 """Difference of two normals, and of two places over the mean radius, that are of one plane."""
@@ -41,8 +41,7 @@ class Gaps:
 
     def rates(self, configuration: Configuration) -> csr_array:
         """By how much each gap closes by displacements, shape (G, coordinates)."""
-        closing = np.hstack([-self.normal, np.zeros_like(self.normal)])
-        return particle_rows(configuration, (self.i, self.j), np.array([closing, -closing]))
+        return csr_array(each_of(-self.normal) @ configuration.pair_rows((self.i, self.j)))
 
 
 def near_pairs(

@@ -112,13 +112,13 @@ Only this module and mindlin_law.h contain the law. See docs/howto_law.md for ho
 """
 
 from dataclasses import dataclass
-from math import isfinite, prod
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Floats, set_frozen
+from ..arrays import Booleans, Floats, ratio, set_frozen
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
@@ -241,7 +241,7 @@ class MindlinLaw:
         overlap = _closed_overlap(overlap)
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
-    def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> NDArray[np.bool_]:
+    def at_bound(self, overlap: ArrayLike, slip: ArrayLike) -> Booleans:
         """Which contacts have reached Coulomb's bound, within rounding; none without friction."""
         limit = self.slip_limit(overlap)
         return (np.abs(slip) >= AT_THE_BOUND * limit) & (limit > 0)
@@ -275,11 +275,6 @@ class MindlinLaw:
         """d f_n / d overlap = p kn overlap^(p-1), force / length."""
         return self.exponent * self.kn * self.growth(_closed_overlap(overlap))
 
-    def normal_curvature(self, overlap: ArrayLike, order: int = 2) -> Floats:
-        """Derivative of f_n of some order, 2 by default: force / length^order, of positive overlaps."""
-        factor = prod((self.exponent - k for k in range(order)), start=self.kn)
-        return factor * np.power(np.asarray(overlap, dtype=np.float64), self.exponent - order)
-
     def overlap_of_force(self, force: float) -> float:
         """The inverse of `normal_force`: overlap (force / kn)^(1/p) of a contact that carries a force, length."""
         return float((force / self.kn) ** (1 / self.exponent))
@@ -303,7 +298,7 @@ class MindlinLaw:
         spring = -self.kt * self.growth(overlap)
         if self.coulomb:
             return spring * slip
-        x = _ratio(np.abs(slip), self.slip_limit(overlap))
+        x = ratio(np.abs(slip), self.slip_limit(overlap))
         return spring * (1 + x - x * x) * slip
 
     def derivatives(
@@ -334,7 +329,7 @@ class MindlinLaw:
         if limit.all():
             x, steep = np.abs(slip) / limit, slip / rest_power
         else:  # an open contact has no slip either
-            x, steep = _ratio(np.abs(slip), limit), _ratio(slip, rest_power)
+            x, steep = ratio(np.abs(slip), limit), ratio(slip, rest_power)
         rest, triple, soft = 1 - x, 3 * x, -self.kt * root
         if self.coulomb:
             slides = np.logical_and(sliding, x >= AT_THE_BOUND)
@@ -388,9 +383,3 @@ def known_exponents() -> str:
 def _closed_overlap(overlap: ArrayLike) -> Floats:
     """Overlaps, zero for open contacts; long doubles remain long doubles."""
     return np.maximum(np.asarray(overlap, dtype=np.result_type(overlap, np.float64)), 0.0)
-
-
-def _ratio(numerator: Floats, denominator: Floats) -> Floats:
-    """numerator / denominator, zero where the denominator is: an open contact has no slip either."""
-    zeros = np.zeros(np.shape(numerator), np.result_type(numerator, denominator))
-    return np.divide(numerator, denominator, out=zeros, where=denominator > 0)

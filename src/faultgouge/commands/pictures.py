@@ -101,11 +101,11 @@ def _picture_of_run(file: Path) -> Figure | None:
     from faultgouge.analysis.responses.hysteresis import turning_points
     from faultgouge.figures import draw_cycle
     from faultgouge.figures.series import draw_drive, draw_growth
-    from faultgouge.pywrap.runs.drive import series_and_slips
+    from faultgouge.pywrap.runs.drive import SERIES, slips_in
 
     with RunFile(file) as run:
-        if driven := series_and_slips(run):
-            return draw_drive(*driven)
+        if SERIES in run.names_of_series:
+            return draw_drive(run.series(SERIES), slips_in(run)[0])
         if turning_points(run.fx):
             return draw_cycle([run.packing(k) for k in range(len(run))])
         if not (growth := growth_in(run)):
@@ -163,14 +163,14 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.figures.motion_films import Course, RunMotion, film_of_ramp, film_of_run
-    from faultgouge.pywrap.runs.drive import series_and_slips
+    from faultgouge.pywrap.runs.drive import SERIES, slips_in
 
     if file.suffix == ".disks" or holds_configuration(file):
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     with RunFile(file) as run:
         if motion := RunMotion.read(run):
             return film_of_run(motion if span is None else motion.between(*span), count, dots=dots)
-        driven, shown, course = series_and_slips(run), [*range(len(run))], None
+        driven, shown, course = SERIES in run.names_of_series, [*range(len(run))], None
         if driven:
             first, last = span or (-inf, inf)
             times = run.observable("time")
@@ -178,11 +178,11 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             if len(shown) < 2:
                 says = f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}"
                 raise PackingFileError(f"{says}, and a film shows two or more: give a longer --span")
-            course = Course.of_drive(*driven, times[shown].tolist(), first, last)
+            course = Course.of_drive(run.series(SERIES), slips_in(run)[0], times[shown].tolist(), first, last)
         packings = [run.packing(k) for k in shown]
     if len(packings) < 2:
         raise PackingFileError(f"{file} has one equilibrium and no trajectory: ask for a mode with --mode")
-    return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven is not None)
+    return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven)
 
 
 @command(f"{RAMPED} && faultgouge view run.h5 -o page.html", writes="file", alone=True)

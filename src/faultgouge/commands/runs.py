@@ -272,12 +272,12 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
 
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.responses.slips import friction_of
-    from faultgouge.pywrap.runs.drive import SERIES, advance_error, all_slips_in, clock_advance, strays
+    from faultgouge.pywrap.runs.drive import SERIES, advance_error, clock_advance, slips_in, strays
     from faultgouge.studies.result_rows import write_csv
 
     assert scene.drive is not None
     with RunFile(output) as file:
-        (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
+        (slips, under_way), series, times = slips_in(file), file.series(SERIES), file.observable("time")
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
     before = (np.searchsorted(times, [slip.begins for slip in slips], side="right") - 1).tolist()
     after = np.searchsorted(times, [slip.ends for slip in slips]).tolist()
