@@ -35,7 +35,7 @@ from ..analysis.counted import counted
 from ..analysis.files.atomic_write import check_own, make_folder, read_plain, write_json
 from ..analysis.has_configuration import HasConfiguration
 from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
-from ..analysis.motion.linear import all_rates, linear_verdict
+from ..analysis.motion.linear import all_rates
 from ..analysis.motion.modes import Modes, participation_ratio
 from ..analysis.motion.motion import Motion
 from ..analysis.responses.slips import Slip
@@ -50,10 +50,6 @@ if TYPE_CHECKING:
 
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
-
-ALL_RATES = 1500
-"""Coordinates up to which LAPACK computes all eigenvalues with dissipation, ten seconds: the fastest growing motion
-alone, which is known of more coordinates, may be that of one disk."""
 
 INVERSE_STEPS = 3
 """Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
@@ -124,14 +120,9 @@ def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE
 
     shared = shares(modes.right)
     rates = 2 * np.abs(np.sqrt(values[(complex_ | negative) & shared].astype(complex)).imag)
-    stiffness, damping, damped = motion.stiffness.toarray(), motion.damping.toarray(), None
-    # LAPACK's, the fastest growing first; of a large packing the fastest alone
-    large = len(motion.active) > ALL_RATES
-    for s in [linear_verdict(motion, decides=False).s] if large else all_rates(motion)[0]:
-        pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
-        if shares(null_vector(pencil)[:, None])[0]:
-            damped = float(2 * s.real)
-            break
+    stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
+    pencils = ((s, s * s * np.eye(len(stiffness)) + s * damping + stiffness) for s in all_rates(motion)[0])
+    damped = next((2 * float(s.real) for s, pencil in pencils if shares(null_vector(pencil)[:, None])[0]), None)
     lowest = values[shared & (np.abs(values) > zero)].real.min(initial=np.inf)
     pairs, alone = np.count_nonzero(complex_ & shared) // 2, np.count_nonzero((complex_ | negative) & ~shared)
     numbers = (int(pairs), float(rates.max(initial=0.0)), damped, float(lowest), int(alone))
@@ -175,9 +166,7 @@ def draw_cycle_spectrum(
     draw_slips(panels, slips)
     force.plot(series["time"], series["force"], color="C1", linewidth=0.8)
     force.set_ylabel("force $F$")
-    force.margins(y=0.12)
-    time = np.array([state["time"] for state in states])
-    slipping = np.array([bool(state["slips"]) for state in states])
+    time, slipping = (np.array([state[name] for state in states]) for name in ("time", "slips"))
     for axes, (label, names) in zip(others, DRAWN.items(), strict=True):
         for colour, (name, words) in zip(("C0", "C2", "C3"), names.items(), strict=False):
             value = np.array([state[name] for state in states], dtype=float)
@@ -186,24 +175,22 @@ def draw_cycle_spectrum(
             axes.plot(time[slipping], value[slipping], ".", color=colour, markersize=3, alpha=0.3)
         axes.set_ylabel(label)
         axes.legend(fontsize=6, loc="best")
-    for axes in others[1:]:
-        axes.set_yscale("symlog", linthresh=1.0)
-        axes.axhline(0, color="0.5", linewidth=0.6)
+        if axes is not others[0]:
+            axes.set_yscale("symlog", linthresh=1.0)
+            axes.axhline(0, color="0.5", linewidth=0.6)
     for axes in panels:
         axes.margins(x=0)
+    force.margins(x=0, y=0.12)
     panels[-1].set_xlabel("$t$")
     figure.align_ylabels()
     return figure
 
 
+STUCK, RATES = "all sticking", {"undamped_sticking": "undamped", "damped_sticking": "damped"}
 DRAWN = {
-    "complex pairs": {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
-    "growth rate of $D$": {
-        "undamped_sticking": "undamped",
-        "damped_sticking": "damped",
-        "damped_sliding": "damped, sliding",
-    },
-    "lowest eigenvalue": {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
+    "complex pairs": {"pairs_sticking": STUCK, "pairs_sliding": "all sliding"},
+    "growth rate of $D$": RATES | {"damped_sliding": "damped, sliding"},
+    "lowest eigenvalue": {"lowest_sticking": STUCK, "lowest_sliding": "all sliding"},
 }
 """Numbers of states that the panels below the force show."""
 
@@ -261,25 +248,22 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
         make_folder(output, "cycle.json")
         check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         digest = hashlib.sha256(read_plain(path)).hexdigest()
-        rows, left_out = Rows(output / "cycle.jsonl", digest[:12]), ("scene", "version")
-        spring, slips, times = float(settings.spring), slips_in(file), file.observable("time")
-        series, displacement = file.series(SERIES), file.observable("displacement")
+        rows, spring, slips = Rows(output / "cycle.jsonl", digest[:12]), float(settings.spring), slips_in(file)[0]
+        series, times, displacement = file.series(SERIES), file.observable("time"), file.observable("displacement")
         missing = [frame for frame in range(len(file)) if rows.find(frame=frame) is None]
         for frame in progress(missing, len(missing)):
             packing, time = file.packing(frame), float(times[frame])
             where = {"frame": frame, "time": time, "force": packing.fx, "displacement": float(displacement[frame])}
             slipping = any(slip.begins < time <= slip.ends for slip in slips)
             rows.append(**where, slips=slipping, **cycle_state(packing, spring))
-    states = [{key: row[key] for key in row if key not in left_out} for row in rows.rows]
+    states = [{key: row[key] for key in row if key not in ("scene", "version")} for row in rows.rows]
     result = {"file": path.name, "sha256": digest, "spring": spring, "slips": [asdict(slip) for slip in slips]}
     write_json(output / "cycle.json", result | {"states": states})
     write_csv(output / "cycle.csv", CYCLE_COLUMNS, states)
     draw_all({"cycle": lambda: draw_cycle_spectrum(series, slips, states)}, output, say)
-    table = []
-    for number, slip in enumerate(slips, 1):
-        before = [state for state in states if state["time"] <= slip.begins][-1]
-        cells = ("" if before[name] is None else f"{before[name]:.4g}" for name in COLUMNS_BEFORE_SLIPS)
-        table.append([str(number), *cells])
+    before = [[state for state in states if state["time"] <= slip.begins][-1] for slip in slips]
+    cells = [["" if row[name] is None else f"{row[name]:.4g}" for name in COLUMNS_BEFORE_SLIPS] for row in before]
+    table = [[str(number), *row] for number, row in enumerate(cells, 1)]
     moving = sum(not state["rests"] for state in states)
     return [
         *([table_of(("slip", *COLUMNS_BEFORE_SLIPS.values()), table)] if table else []),

@@ -49,7 +49,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from ..arrays import derive_frozen
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
 
@@ -122,7 +122,7 @@ def stable_timestep(
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
     if damping is not None and len(c) and not c.viscous_slider.any():  # the law of this package: c = 2
         damping = 2.0 * damping
-    scale = 1.0 / np.sqrt(coordinate_mass(of))
+    scale = 1.0 / np.sqrt(of.coordinate_mass)
     found = _limit(scale, stiffness, damping)
     k, g = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
     # rounding may take the limit below the bound where the two are the same

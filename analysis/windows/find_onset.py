@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -120,6 +121,7 @@ def find_onset(
     dissipation: bool = False,
     first: bool = False,
     ranks: Ranks = ALONE,
+    folder: Path | None = None,
     limits: Limits = LIMITS,
 ) -> Onset:
     """Find the windows of growing motion between the smallest and the largest load.
@@ -146,6 +148,9 @@ def find_onset(
         the window is None if it lies beyond this increment.
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
+    folder : Path, optional
+        Folder in which a search stores its results, slice by slice, if its bases are too large for memory. A search of
+        the same loads and operators continues from there, to the bit. All ranks write to the folder.
 
     Returns
     -------
@@ -159,6 +164,8 @@ def find_onset(
         If an eigenvalue is negative before any is complex.
     SliceError
         Of a large packing, if a part of the spectrum is not found.
+    OutputError, DamagedSliceError
+        If a file in the folder cannot be written, or read.
     ValueError
         If the loads are not at least two increasing numbers, or if the packing has no dissipation although
         `dissipation` is set.
@@ -176,7 +183,7 @@ def find_onset(
             return windows[:1] if first else windows, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
-        window, doubtful = SlicedSearch(system, ranks, limits).first_window(loads)
+        window, doubtful = SlicedSearch(system, ranks, folder, limits).first_window(loads)
         return (window,) if window else (), doubtful
 
     def at(fx: float) -> HasConfiguration:

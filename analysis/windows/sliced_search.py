@@ -20,7 +20,8 @@ The eigenvectors of slices take most of the time, and one slice needs nothing of
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import chain, pairwise
-from typing import NamedTuple, NoReturn
+from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
@@ -35,27 +36,18 @@ from .motions import Motions, System
 from .onset import Increments, Window
 from .quiet import Quiet
 from .search import Search
-from .slices import ALONE, LIMITS, Limits, Ranks, slices
-
-
-class Candidate(NamedTuple):
-    """A motion that begins to grow in its slice.
-
-    Attributes
-    ----------
-    increment : int
-        On which of the increments between some loads.
-    onset, inside : float
-        The load from which on it grows, and one at which it still does; force per top disk.
-    value, slope : complex
-        lambda, or s with dissipation, at the load `inside`, and its change over the load.
-    """
-
-    increment: int
-    onset: float
-    inside: float
-    value: complex
-    slope: complex
+from .slices import (
+    ALONE,
+    LIMITS,
+    Candidate,
+    Limits,
+    Ranks,
+    SliceResult,
+    keep_result,
+    kept_results,
+    results_folder,
+    slices,
+)
 
 
 class _LostError(Exception):
@@ -69,12 +61,14 @@ class SlicedSearch:
     ----------
     at : callable
         Load -> System.
-    ranks, limits
+    ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
-    def __init__(self, at: Callable[[float], System], ranks: Ranks = ALONE, limits: Limits = LIMITS) -> None:
-        self.at, self.ranks, self.limits = at, ranks, limits
+    def __init__(
+        self, at: Callable[[float], System], ranks: Ranks = ALONE, folder: Path | None = None, limits: Limits = LIMITS
+    ) -> None:
+        self.at, self.ranks, self.folder, self.limits = at, ranks, folder, limits
         self.doubtful: list[tuple[float, float]] = []
         self.passed: list[System] = []
         self.crowded = False
@@ -184,28 +178,34 @@ class SlicedSearch:
         return found
 
     def _announced(self, places: Sequence[System]) -> list[Candidate]:
-        """The motions that slices announce, of all ranks."""
-        own = self.ranks.part(len(places[0].active))
+        """The motions that slices announce, of all ranks, and those that a search that was cut off has left."""
+        count, folder = len(places[0].active), None
+        if self.folder is not None and not self._keeps(places[0]):  # later increments need bases that are kept
+            folder = results_folder(self.folder, places, self.limits)
+        root = self.ranks.rank == 0
+        stored = self.ranks.together(lambda: kept_results(folder) if folder is not None and root else [])[0]
+        before = sum(each.border.size for each in stored)
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        report_progress(f"{where}: counting modes")
+        report_progress(f"{where}: {before} of {count} modes are known")
 
-        def search_slices() -> tuple[list[Candidate], bool]:
-            """Of this rank's slices, and whether one is crowded."""
-            found, done, crowded = list[Candidate](), 0, False
-            for basis in self._bases(places[0]):
+        def search_slices() -> list[SliceResult]:
+            """Those of this rank."""
+            found: list[SliceResult] = []
+            done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
+            for basis in self._bases(places[0], stored):
                 done += basis.own.stop - basis.own.start
-                report_progress(f"{where}: {done} of {own.stop - own.start} modes")
-                candidates, full = self._search_slice(basis, places)
-                found, crowded = found + candidates, crowded or full
-            return found, crowded
+                report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
+                found.append(self._search_slice(basis, places))
+                if folder is not None:
+                    keep_result(folder, found[-1])
+            return found
 
-        every = self.ranks.together(search_slices)
-        self.crowded = self.crowded or any(crowded for _, crowded in every)
-        return list(chain.from_iterable(found for found, _ in every))
+        every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
+        self.crowded = self.crowded or any(each.crowded for each in every)
+        return [candidate for each in every for candidate in each.candidates]
 
-    def _search_slice(self, basis: Slice, places: Sequence[System]) -> tuple[list[Candidate], bool]:
-        """Which of one slice's own motions begin to grow between the loads, and whether dashpots couple more of its
-        motions than a slice can hold."""
+    def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
+        """The windows of the small families between the loads, of one slice's own motions."""
         blocks = [reduce_system(basis.vectors, each, places[0].active) for each in places]
         damped = len(blocks[0]) == 2
         if not damped and len(blocks[0][0]) < len(places[0].active):
@@ -234,29 +234,34 @@ class SlicedSearch:
                     j = growing[np.argmin(np.abs(apart.imag if damped else apart.real))]
                     slope = state.slopes(small(here.fx if inside > here.fx else last))[j]
                     found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
-        return found, quiet.crowded
+        return SliceResult(basis.border, found, quiet.crowded)
 
-    def _bases(self, place: System) -> Iterator[Slice]:
+    def _keeps(self, place: System) -> bool:
+        """Whether there is memory for the bases of all modes."""
+        count = len(place.active)
+        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
+        return (count + margins) * count <= self.limits.largest_basis
+
+    def _bases(self, place: System, stored: Sequence[SliceResult]) -> Iterator[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
         mine = [_mixing(each, place) for each in self._kept]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
             yield from self._kept
             return
-        self._kept = []  # its memory is free before that for the next ones is taken
+        self._kept, keeps = [], self._keeps(place)  # its memory is free before that for the next ones is taken
         matrix = csr_array(place.inner[0])
         symmetric, count = csc_array(0.5 * (matrix + matrix.T)), len(place.active)
         bases: Iterator[Slice] = iter(())
         if count > self.limits.one_basis:
-            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks)
-        elif self.ranks.rank == 0:  # a small operator has one
+            borders = [each.border for each in stored]
+            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks, known=borders)
+        elif self.ranks.rank == 0 and not stored:  # a small operator has one
             values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
             bases = iter([Slice(0, values, vectors, slice(0, count))])
-        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
-        if (count + margins) * count <= self.limits.largest_basis:
-            bases = iter(kept := list(bases))
-            self._kept = kept
-        yield from bases
+        if keeps:
+            self._kept = list(bases)
+        yield from self._kept if keeps else bases
 
 
 def reduce_system(vectors: Floats, system: System, active: Indices) -> list[Floats]:

@@ -1,18 +1,31 @@
-"""The slices of a spectrum, shared by threads and by processes that search together.
+"""The slices of a spectrum, shared by threads and by processes that search together; and the folder that keeps results.
 
 The eigenvectors of slices take most of the time, and one slice needs nothing of another. So each rank finds the
 eigenvectors of its own slices, a run of neighbouring ones, by :mod:`~faultgouge.analysis.factors.lanczos`, and hands
 the pairs that may turn complex to the other ranks. All ranks count eigenvalues together, and do the rest alike and in
 step. No rank has the vectors of another, and the result is that of one process to the bit.
+
+A slice of 100,000 disks takes 13 s, and its result is small: the motions that may grow, and the eigenvalues that
+neighbouring slices must agree on. So the rank that has searched a slice writes one file for it, in one step, and a
+search that was cut off goes on from these files. The name of their folder is a checksum of the loads, the operators
+there, the limits, and the version of this program, so that results of another packing are never used. A
+damaged file is that of a slice that is searched again.
 """
 
+import hashlib
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib.metadata import version
+from io import BytesIO
 from itertools import chain, pairwise
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+from uuid import uuid4
+from zipfile import BadZipFile
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -21,6 +34,8 @@ from ..arrays import Floats
 from ..errors import FaultgougeError
 from ..factors.inertia import count_places, places_of_numbers
 from ..factors.lanczos import Border, Factorization, Slice, SlicedSpectrum, SliceSizes, compare_slices, factor_shifted
+from ..files.atomic_write import make_folder, write_whole
+from .motions import System
 
 Mine = TypeVar("Mine")
 
@@ -120,6 +135,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factorization] = factor_shifted,
     ranks: Ranks = ALONE,
+    known: Sequence[Border] = (),
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -134,6 +150,8 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
+    known : sequence of Border
+        Slices that are left out.
 
     Raises
     ------
@@ -154,9 +172,10 @@ def slices(
         places, numbers = count_places(spectrum.matrix, count_below, (0, size), limits.count_spacing)
         pieces = max(1, round(size / limits.slice_size))
         ends = np.arange(pieces + 1) * size // pieces
-        borders = places_of_numbers(places, numbers, ends)
+        borders, found = places_of_numbers(places, numbers, ends), {each.modes for each in known}
         middles = 0.5 * (borders[:-1] + borders[1:])
         wanted = [(float(at), (int(a), int(b))) for at, (a, b) in zip(middles, pairwise(ends), strict=True)]
+        wanted = [each for each in wanted if each[1] not in found]
         waiting: deque[Future[Slice]] = deque()
 
         def next_slice() -> Slice:
@@ -180,4 +199,87 @@ def slices(
             raise failure
         return mine
 
-    compare_slices(*sorted(chain(*ranks.together(borders_found))))
+    compare_slices(*sorted(chain(known, *ranks.together(borders_found))))
+
+
+class Candidate(NamedTuple):
+    """A motion that begins to grow in its slice.
+
+    Attributes
+    ----------
+    increment : int
+        On which of the increments between some loads.
+    onset, inside : float
+        The load from which on it grows, and one at which it still does; force per top disk.
+    value, slope : complex
+        lambda, or s with dissipation, at the load `inside`, and its change over the load.
+    """
+
+    increment: int
+    onset: float
+    inside: float
+    value: complex
+    slope: complex
+
+
+class SliceResult(NamedTuple):
+    """What a slice has: its border, the motions that begin to grow in it, increment by increment, and whether dashpots
+    couple more of its motions than a slice can hold."""
+
+    border: Border
+    candidates: list[Candidate]
+    crowded: bool = False
+
+
+MARK = "taken"
+"""An empty file in each folder of results, which says whose it is."""
+
+
+def keep_result(folder: Path, found: SliceResult) -> None:
+    """Write the result of a slice; OutputError if that cannot be."""
+    modes, *border = found.border
+    motions, content = np.array(found.candidates, complex).reshape(-1, len(Candidate._fields)), BytesIO()
+    np.savez(content, modes=modes, border=border, crowded=found.crowded, motions=motions)
+    own = folder / f"{uuid4().hex}.new"  # another search may write the same file at the same time
+    write_whole(own, content.getvalue())
+    own.replace(folder / "{}-{}.npz".format(*modes))
+
+
+def kept_results(folder: Path) -> list[SliceResult]:
+    """The results in a folder by the order of the spectrum, but for those that are damaged."""
+    found = []
+    for path in folder.glob("*-*.npz"):
+        damaged = suppress(OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile)
+        with damaged, np.load(path) as data:
+            first, stop = (int(number) for number in data["modes"])
+            candidates = [
+                Candidate(int(k.real), float(a.real), float(b.real), complex(value), complex(slope))
+                for k, a, b, value, slope in data["motions"]
+            ]
+            border = Border((first, stop), *map(float, data["border"]))
+            found.append(SliceResult(border, candidates, bool(data["crowded"])))
+    return sorted(found, key=lambda each: each.border.modes)
+
+
+def results_folder(parent: Path, places: Sequence[System], limits: Limits) -> Path:
+    """Make the folder of the results on the increments between some loads; OutputError if that cannot be."""
+    digest = hashlib.sha256(repr((version("faultgouge"), limits, [place.fx for place in places])).encode())
+    for matrix in (each for place in places for each in (place.stiffness, place.damping) if each is not None):
+        for array in (matrix.data, matrix.indices, matrix.indptr):
+            digest.update(np.ascontiguousarray(array).data)
+    folder = parent / digest.hexdigest()[:16]
+    make_folder(folder)
+    (folder / MARK).touch()
+    return folder
+
+
+def remove_results(parent: Path) -> None:
+    """Remove folders of results, which have nothing else in them, and the folder that they are in if it is empty."""
+    for mark in parent.glob("[0-9a-f]" * 16 + f"/{MARK}"):
+        for own in (MARK, "shifts.npz", "[0-9]*-[0-9]*.npz", "[0-9a-f]" * 32 + ".new"):
+            for path in mark.parent.glob(own):
+                path.unlink(missing_ok=True)
+        with suppress(OSError):  # it holds what others have put there
+            mark.parent.rmdir()
+    with suppress(OSError):
+        parent.rmdir()

@@ -67,7 +67,7 @@ def relaxation(settings: Settings) -> Study:
             return engine.packing, steps
 
         plain, fine = (1e-1, 1e-4, 1e-7, 0.0), (1e-1, 1e-4, 1e-7, 1e-12, 0.0)
-        runs: list[Run[Packing]] = [("Newton", force, partial(newton, engine, start, force)) for force in plain]
+        runs: list[Run] = [("Newton", force, partial(newton, engine, start, force)) for force in plain]
         runs += [
             ("Newton" + COMPENSATED_SUFFIX, force, partial(newton, careful, careful_start, force)) for force in fine
         ]
@@ -120,7 +120,7 @@ def onset(settings: Settings) -> Study:
             return found.fx_c, computed
 
         fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
-        runs: list[Run[float]] = [("scan, Newton", h, partial(lambda h: scan(fresh(), h), h)) for h in fine]
+        runs: list[Run] = [("scan, Newton", h, partial(lambda h: scan(fresh(), h), h)) for h in fine]
         coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
         runs += [("root of the discriminant", h, partial(by_root, h)) for h in coarse]
         points, _ = timed(runs, settings, lambda fx: max(abs(fx - exact), resolution))

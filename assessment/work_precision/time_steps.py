@@ -104,7 +104,7 @@ def trajectory(settings: Settings) -> Study:
 
         ends = [in_lammps(finest // part)[0] for part in (4, 2, 1)]
         rough, exact = ((4 * ends[k + 1] - ends[k]) / 3 for k in (0, 1))
-        runs: list[Run[Floats]] = [("LAMMPS", TIME / n, partial(in_lammps, n)) for n in steps]
+        runs: list[Run] = [("LAMMPS", TIME / n, partial(in_lammps, n)) for n in steps]
         runs += [("NumPy", TIME / n, partial(verlet, packing, n)) for n in steps[:coarse]]
         points, found = timed(runs, settings, lambda end: float(np.abs(end - exact).max()))
     reference_error = float(np.abs(exact - rough).max())
@@ -129,15 +129,11 @@ def growth(settings: Settings) -> Study:
     displacement[active], onto[active] = right[:, k], left[:, k]
     start = displacement.real / root
     start *= AMPLITUDE / np.abs(start).max()
-
-    def off(omega: complex) -> float:
-        """Relative error of a growth rate, no less than the rounding of a number."""
-        return max(abs(2 * abs(omega.imag) / exact - 1), float(np.finfo(float).eps))
-
     with Engine(packing) as engine:
 
-        def run(dt: float) -> tuple[tuple[float, ...], int]:
-            """Errors of the rate that a run shows, as it is, and with the dispersion taken out; and its steps."""
+        def run(dt: float) -> tuple[list[float], int]:
+            """Errors of the rate that a run shows, as it is, and with the dispersion taken out, no less than the
+            rounding of a number; and its steps."""
             every = max(1, round(0.25 * np.pi / omega.real / dt))  # an eighth of a period
             engine.restore(engine.displace(packing, start))
             signal = []
@@ -149,15 +145,16 @@ def growth(settings: Settings) -> Study:
             b = np.array(signal)
             cosine = np.vdot(b[1:-1], b[2:] + b[:-2]) / (2 * np.vdot(b[1:-1], b[1:-1]).real)
             seen = np.arccos(cosine) / (every * dt)
-            return (off(seen), off(2 / dt * np.sin(0.5 * dt * seen))), int(time / dt)
+            off = (abs(2 * abs(each.imag) / exact - 1) for each in (seen, 2 / dt * np.sin(0.5 * dt * seen)))
+            return [max(each, float(np.finfo(float).eps)) for each in off], int(time / dt)
 
         steps = (limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])).tolist()
-        runs: list[Run[tuple[float, ...]]] = [(RUN, dt, partial(run, dt)) for dt in steps]
-        points, errors = timed(runs, settings, lambda errors: errors[0])
-    corrected = zip(points, errors, strict=True)
-    points += [point._replace(method=RUN_CORRECTED, error=both[1]) for point, both in list(corrected)]
-    noise = float(np.median([point.error for point in points if point.method == RUN_CORRECTED]))
+        points, errors = timed([(RUN, dt, partial(run, dt)) for dt in steps], settings, lambda errors: errors[0])
+    corrected = [
+        point._replace(method=RUN_CORRECTED, error=off) for point, (_, off) in zip(points, errors, strict=True)
+    ]
+    noise = float(np.median([point.error for point in corrected]))
     order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
     numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}
     numbers |= {"slower": 2 / limit / abs(omega), "resolution": resolution}
-    return study_of("growth", points, resolution, numbers, orders=[order])
+    return study_of("growth", points + corrected, resolution, numbers, orders=[order])

@@ -44,7 +44,7 @@ def triggering_figures(found: Triggering) -> Figures:
     own = {f"$\\mu_{{ss}} = {weak.mu_ss:g}$, $B = {weak.B:g}$, $w = {weak.w:g}$": replace(weak, v0=0.0, v_ss=1.0)}
     return {
         "figure2": partial(friction_law_figure, own, mu, 5.5 / weak.w, "$(v - v_0)/v_{ss}$"),
-        "figure5a": partial(eruption_figure, *three, runs.get("control"), found.outcome.crossing),
+        "figure5a": partial(eruption_figure, *three, runs.get("control"), found.outcome["weakens_at"]),
         "figure5b": partial(weakening_figure, speed, erupting["friction"], weak, mu),
         "figure6": partial(friction_law_figure, FITTED, 1.0, 1.0, "$v/v_{ss}$"),
     }

@@ -49,4 +49,4 @@ QUIET = Forecast(1e-16, 0.0, 5.0, 0.0)
 def test_only_growth_at_the_rate_of_the_spectrum_and_beyond_the_jump_is_an_instability(
     msd, crossing, foreseen, verdict
 ):
-    assert judge(run_of(msd, crossing), V0, foreseen).verdict == verdict
+    assert judge(run_of(msd, crossing), V0, foreseen)["verdict"] == verdict

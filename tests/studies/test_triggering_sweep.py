@@ -74,25 +74,17 @@ def test_quartiles_count_packings_without_onset():
     np.testing.assert_allclose(early, [[0.01, 0.02], [0.25, 0.625]])
 
 
-def test_first_onset_is_that_of_the_whole_ramp():
-    scene = Scene.from_mapping(SCENE)
-    found, path = triggering.first_onset(scene, settle(scene, 1.0))
-    whole = onset_run(scene, 1.0)
-    assert (found["ends"], found["reach"]) == ("onset", pytest.approx(whole.fx_c, rel=1e-9))
-    assert found["error"] < 1e-9
-    assert path[-1].fx - scene.ramp.step <= found["reach"] <= path[-1].fx
-
-
-def test_what_was_found_before_a_failure_is_kept(monkeypatch):
+def test_what_was_found_before_a_failure_is_kept_and_first_onsets_are_those_of_whole_ramps(monkeypatch):
     def fail(*_):
         raise NoEquilibriumError("no eruption today")
 
-    found = {1.0: end(*LATE), 0.8: end(*EARLY, mu=0.8)}
-    monkeypatch.setattr(triggering, "first_onset", lambda scene, rest: (rest, ()))
+    scene = Scene.from_mapping(SCENE)
     monkeypatch.setattr(triggering, "eruption", fail)
-    result = triggering.triggering.row(Scene.from_mapping(SCENE), found.get)
-    assert [each["reach"] for each in result["ramps"]] == [0.02, 0.01]
+    result = triggering.triggering.row(scene, lambda mu: settle(scene, mu))
     assert (result["lowered"], result["says"]) == (True, "no eruption today")
+    for found in result["ramps"]:
+        assert (found["ends"], found["reach"]) == ("onset", pytest.approx(onset_run(scene, found["mu"]).fx_c, rel=1e-9))
+        assert found["error"] < 1e-9
 
 
 def test_eruptions_are_counted():

@@ -18,6 +18,7 @@ from faultgouge.analysis.motion.certificate import NoProofError, prove
 from faultgouge.analysis.motion.eigenvalues import exponential
 from faultgouge.analysis.motion.linear import linear_verdict, opposed
 from faultgouge.analysis.motion.random_state import follow_decay
+from faultgouge.analysis.motion.slow_motions import slow_motions
 
 
 def random_packing(seed):
@@ -86,6 +87,14 @@ def test_certificate_against_lapack_on_random_packings(first):
         if found.s:
             assert np.abs(s - found.s).min() <= max(found.error, 1e-6 * top)
     assert proofs >= 5
+
+
+def test_a_certificate_bounds_fast_motions_that_decay_more_slowly_than_the_slow_ones():
+    """Lone oscillators, of which the fastest has the weakest dashpot: the error reaches up to 2 Re s of that one."""
+    frequency, dashpot = np.linspace(1.0, 10.0, 200), np.linspace(0.3, 0.1, 200)
+    found = prove(csr_array(np.diag(frequency**2)), csr_array(np.diag(dashpot)), 0.0)
+    assert found.stable
+    assert found.growth_rate + found.error >= -0.1 > found.growth_rate + 0.5 * found.error
 
 
 @pytest.fixture
@@ -227,6 +236,30 @@ def test_where_dashpots_do_not_hold_the_law_a_random_state_is_followed(beyond_la
     assert found.reasons[0].startswith("the dashpots hold growth at no frequency below that of the fastest motion")
     assert "as motion from a random state shows within t = 5.8" in found.reasons[0]
     assert 0 < found.searched < 20
+
+
+def test_the_slowest_motions_are_those_of_lapack_and_others_stay_in_a_state():
+    """Residuals are 1e-6 of a distance, and others 0.03 of it away: that turns vectors by 3e-5."""
+    times = 0
+    for seed in range(12):
+        a, g = random_packing(seed)
+        size, top = a.shape[0], np.sqrt(abs(a).sum(axis=1).max())
+        s, vectors = np.linalg.eig(
+            np.block([[0 * a.toarray(), top * np.eye(size)], [-a.toarray() / top, -g.toarray()]])
+        )
+        drifts = int(np.sum(np.abs(s) < 1e-5 * top)) // 2
+        found = slow_motions(a, g, csr_array(np.eye(size)), top, drifts)
+        if found is None:
+            continue
+        times, (values, errors, leave) = times + 1, found
+        for each, error in zip(values, errors, strict=True):
+            assert np.abs(s - each).min() <= error + 1e-11 * top
+        known = 2 * drifts + len(values)
+        if not drifts:  # of a double zero LAPACK has no vectors
+            vectors = vectors[:, np.argsort(np.abs(s - 0.1 * top))].real
+            np.testing.assert_allclose(leave(vectors[:, :known]), 0, atol=4e-5)
+            np.testing.assert_allclose(leave(vectors[:, known:]), vectors[:, known:], atol=4e-5)
+    assert times >= 5
 
 
 def made_up(growing, count=150):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
-from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.factors.lanczos import SlicedSpectrum, SliceError, factor_shifted
 from faultgouge.analysis.windows import LIMITS, Limits, Ranks
 from faultgouge.analysis.windows.slices import slices
@@ -146,11 +145,3 @@ def test_an_error_of_one_rank_is_that_of_all(fails, says):
     for each in on_ranks(2, of):
         with pytest.raises(SliceError, match=says):
             each.result()
-
-
-def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
-    def work():
-        raise OutputError("a full disk")
-
-    with pytest.raises(OutputError, match="a full disk"):
-        Ranks(0, 2, None).together(work)
