@@ -306,7 +306,9 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     known = [slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]
     lost = [(disks.id[i], disks.id[j] if j >= 0 else "the floor") for (i, j), size in slip.items() if size]
     if lost:
-        says = f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0][0]} and {lost[0][1]}"
+        says = (
+            f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0][0]} and {lost[0][1]}"
+        )
         raise PackingFileError(f"{disks.source}: {says}: leave such rows out, or give places and radii that touch.")
     return near.slipped(np.array(known))
 
