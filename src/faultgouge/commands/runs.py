@@ -312,14 +312,12 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
         noise, advance = [clock_advance(path, without) for path in noisy], clock_advance(output, without)
         error = advance_error(noise, float(series["time"][1] - series["time"][0]))
         result |= {"clock_advance": advance, "clock_advance_error": error, "clock_advances_of_noise": noise}
-        side = "earlier" if (advance or 0.0) >= 0 else "later"
-        within = "; with noise none follows in the run"
-        if advance is not None and error is not None:
-            alone = ", which noise alone may do" if abs(advance) <= error else ""
-            within = f", \u00b1 {error:.2g} (95 %, of {len(noise)} runs with noise of 1e-12){alone}"
-        yield (
-            "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
-            if advance is None
-            else f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal{within}"
-        )
+        said = "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+        if advance is not None:
+            side = "earlier" if advance >= 0 else "later"
+            said = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+            within = f", \u00b1 {error or 0.0:.2g} (95 %, of {len(noise)} runs with noise of 1e-12)"
+            said += "; with noise none follows in the run" if error is None else within
+            said += ", which noise alone may do" if error is not None and abs(advance) <= error else ""
+        yield said
     yield result
