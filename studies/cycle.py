@@ -216,7 +216,7 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
         make_folder(output, "cycle.json")
         check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         digest = hashlib.sha256(read_plain(path)).hexdigest()
-        rows, spring, slips = Rows(output / "cycle.jsonl", digest[:12]), float(settings.spring), slips_in(file)
+        rows, spring, slips = Rows(output / "cycle.jsonl", digest[:12]), float(settings.spring), slips_in(file)[0]
         series, times, displacement = file.series(SERIES), file.observable("time"), file.observable("displacement")
         missing = [frame for frame in range(len(file)) if rows.find(frame=frame) is None]
         for frame in progress(missing, len(missing)):

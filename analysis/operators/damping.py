@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigs
 
-from ..arrays import Floats, derive_frozen
+from ..arrays import derive_frozen
 from ..has_configuration import HasConfiguration
 
 
@@ -57,13 +57,8 @@ def largest_damping_rate(packing: HasConfiguration) -> float:
     matrix = damping_matrix(derive_frozen(packing.configuration, drag_rate=0.0))
     if matrix.nnz == 0:
         return 0.0
-    scale = diags_array(1 / np.sqrt(coordinate_mass(packing)))
+    scale = diags_array(1 / np.sqrt(packing.coordinate_mass))
     # a fixed start makes the result the same on every rank
     weighted, start = scale @ matrix @ scale, np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
     # arms of torques that are not those of slips leave C not symmetric
     return float(eigs(weighted, 1, which="LR", v0=start, return_eigenvectors=False)[0].real)
-
-
-def coordinate_mass(packing: HasConfiguration) -> Floats:
-    """Masses of all coordinates."""
-    return packing.coordinate_mass

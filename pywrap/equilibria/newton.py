@@ -23,13 +23,13 @@ If a neighbour hits a rattler, the rattler is moved to the middle of its cage: i
 does not matter (:mod:`~faultgouge.pywrap.equilibria.rattlers`).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from ...analysis import Packing, nearest_image, touching
 from ...analysis.arrays import Floats, Indices
+from ..lammps.engine import Engine
 from ..lammps.trial_state import EPSILON, Trial
 from .newton_matrix import IDLE_FORCE_SHARE, StiffnessFactors, factor_stiffness
 from .rattlers import middle_of_cage
@@ -80,17 +80,8 @@ FARTHEST_TRIAL = 0.99
 
 
 class Guess(NamedTuple):
-    """Where an iteration starts.
-
-    Attributes
-    ----------
-    displacement : ndarray, shape (3N,)
-        (dx.., dy.., R dtheta..), length.
-    factors : StiffnessFactors, optional
-        The factors of K with which the displacement was found.
-    answers : float
-        Largest force to which the displacement is the response.
-    """
+    """Where an iteration starts: (dx.., dy.., R dtheta..), length, shape (3N,); the factors of K with which this was
+    found, and the largest force to which it is the response."""
 
     displacement: Floats
     factors: StiffnessFactors | None = None
@@ -98,20 +89,23 @@ class Guess(NamedTuple):
 
 
 def iterate_newton(
-    displaced: Callable[[Packing, Floats], Trial],
-    start: Trial,
+    engine: Engine,
+    base: Packing,
+    fx: float,
     force_tolerance: float | None = None,
     guess: Guess | None = None,
     patient: bool = False,
-) -> tuple[Trial | None, int]:
+) -> Trial | None:
     """Newton's method from one equilibrium.
 
     Parameters
     ----------
-    displaced : callable
-        The trial at the end of a displacement from a packing, under the load that is wanted.
-    start : Trial
-        The equilibrium.
+    engine : Engine
+        LAMMPS with this packing.
+    base : Packing
+        The equilibrium, at any load.
+    fx : float
+        The load that is wanted: force along x on each disk of the upper layer.
     force_tolerance : float, optional
         Residual to stop at. By default the iteration ends at the floor.
     guess : Guess, optional
@@ -123,15 +117,15 @@ def iterate_newton(
     -------
     Trial, or None
         In balance; None where the iteration does not converge.
-    int
-        Force evaluations.
     """
 
     def bearing(trial: Trial, least: float) -> Floats:
         """Contacts of each disk that carry more than a force, shape (N,)."""
         return trial.graph.per_disk(trial.derivatives.normal_force > least)
 
-    base, since, top = start.packing, start.graph, start.still.top
+    engine.set_fx(fx)
+    start = engine.trial_of(base)
+    since, top = start.graph, base.top
     displacement, factors, last = guess or Guess(np.zeros(3 * len(base)))
     iterations, gain = PATIENCE if patient else (NEWTON_ITERATIONS, LEAST_GAIN)
     # rattlers carry no more than an equilibrium may leave
@@ -140,29 +134,29 @@ def iterate_newton(
     times_moved = np.zeros(len(base), dtype=np.int64)
     best: Trial | None = None
     # `last` and `earlier` are the residuals of the two iterations before, and the factors of K are of an earlier trial
-    floor, earlier, worse, evaluations = start.floor, np.inf, 0, 0
+    floor, earlier, worse = start.floor, np.inf, 0
     for iteration in range(iterations):
         if _lammps_refuses(displacement, base):
-            return None, evaluations
-        trial, evaluations = displaced(base, displacement), evaluations + 1
+            return None
+        trial = engine.try_displacement(base, displacement)
         residual = trial.residual
         if best is not None and residual > gain * best.residual:  # a change of contacts may cost some iterations
             if best.residual < FLOORS_OF_ROUNDING * floor:
                 # below the floor the trial that moved less is as good
-                return trial if residual < best.residual and floor < best.residual else best, evaluations
+                return trial if residual < best.residual and floor < best.residual else best
             worse += 1
             if worse > ITERATIONS_WITHOUT_GAIN:
-                return None, evaluations
+                return None
         # what a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved
         if (guess is None or iteration > 0) and (best is None or residual < best.residual):
             best = trial
         if best is not None:
             if residual <= (0.1 * floor if force_tolerance is None else force_tolerance):
-                return best, evaluations
+                return best
             # the next residual falls by at least the factor of this one, rounding apart: it may be far below the floor
             factor = last / earlier if earlier < np.inf else FIRST_GAIN
             if residual < floor and factor * last < 0.1 * floor:
-                return best, evaluations
+                return best
         suffice = residual * (residual / last) ** REUSE_ITERATIONS < 0.1 * floor
         if factors is None or not (suffice or (len(base) > REUSE_SIZE and residual <= REUSE_LIMIT * last)):
             floor, count = trial.floor, bearing(trial, trial.floor)
@@ -172,12 +166,12 @@ def iterate_newton(
             times_moved[disks] += 1
             if len(disks):
                 displacement = _out_of_the_way(trial.packing, disks, displacement)
-                trial, evaluations = displaced(base, displacement), evaluations + 1
+                trial = engine.try_displacement(base, displacement)
             factors = factor_stiffness(trial, floor, since, factors)
         earlier, last = last, trial.residual
         step = None if factors is None else factors.solver.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
-            return None, evaluations
+            return None
         if iteration < FREEING_ITERATIONS and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
         if base.compensated:
@@ -186,7 +180,7 @@ def iterate_newton(
             if trial.residual < FLOORS_OF_ROUNDING * trial.graph.rounding(trial.derivatives.normal_stiffness, rounding):
                 base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step
-    return None, evaluations
+    return None
 
 
 def too_long(step: Floats, packing: Packing) -> bool:

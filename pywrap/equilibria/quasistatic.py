@@ -140,7 +140,7 @@ def equilibrate(
     NoEquilibriumError
         If no permitted method finds an equilibrium.
     """
-    packing, guess, onward = last.packing, None, onward and last.fx != fx
+    packing, guess, begin = last.packing, None, engine.evaluations
     if beside is not None:  # the displacement to the other equilibrium in proportion
         moved = nearest_image(beside.packing.position - packing.position, packing.box_length)
         turned = beside.packing.scaled_angle - packing.scaled_angle
@@ -152,29 +152,24 @@ def equilibrate(
         factors = factor_stiffness(trial, trial.floor)
         step = None if factors is None else factors.solver.solve(push)
         guess = None if step is None or too_long(step, packing) else Guess(step, factors, abs(fx - packing.fx))
-    here, target, evaluations = last, fx, 0
+    found = None if guess is None else _newton(engine, last, fx, force_tolerance, guess)
+    here, target = found or last, fx
     while here.fx != fx or here is last:
-        found, spent = _newton(engine, here, target, force_tolerance, guess)
-        evaluations += spent
+        found = _newton(engine, here, target, force_tolerance)
         if found is not None:
             here, target = found, fx
-        elif guess is not None:
-            guess = None
-        elif fx == here.fx or abs(target - here.fx) < SMALLEST_SHARE * abs(fx - last.fx):
-            break
-        else:
+        elif fx != here.fx and abs(target - here.fx) >= SMALLEST_SHARE * abs(fx - last.fx):
             target = 0.5 * (here.fx + target)
-    else:
-        return replace(here, evaluations=evaluations)
-    found = _otherwise(engine, here, last, fx, force_tolerance) if onward else None
-    if found is None:
-        tried = f"; tried were {ATTEMPTS}" if onward else ""
-        raise NoEquilibriumError(
-            f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
-            f"{'' if here.packing.law.frictional else SMOOTH_FLOOR_ADVICE}",
-            here.fx,
-        )
-    return found
+        elif found := _otherwise(engine, here, last, fx, force_tolerance) if onward and last.fx != fx else None:
+            here = found
+        else:
+            tried = f"; tried were {ATTEMPTS}" if onward and last.fx != fx else ""
+            raise NoEquilibriumError(
+                f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
+                f"{'' if packing.law.frictional else SMOOTH_FLOOR_ADVICE}",
+                here.fx,
+            )
+    return replace(here, evaluations=engine.evaluations - begin)
 
 
 def _newton(
@@ -184,15 +179,13 @@ def _newton(
     force_tolerance: float | None,
     guess: Guess | None = None,
     patient: bool = False,
-) -> tuple[Equilibrium | None, int]:
-    """Newton's method from one equilibrium, None where it does not converge; and the force evaluations."""
-    engine.set_fx(fx)
-    trial = engine.trial_of(base.packing)
-    best, evaluations = iterate_newton(engine.try_displacement, trial, force_tolerance, guess, patient)
+) -> Equilibrium | None:
+    """Newton's method from one equilibrium, None where it does not converge."""
+    best = iterate_newton(engine, base.packing, fx, force_tolerance, guess, patient)
     if best is None:
-        return None, evaluations
+        return None
     engine.kept = best
-    return Equilibrium(best.packing, best.residual, best.floor, evaluations), evaluations
+    return Equilibrium(best.packing, best.residual, best.floor, 0)
 
 
 def _otherwise(
@@ -202,13 +195,10 @@ def _otherwise(
 
     def through(start: Equilibrium, loads: list[float], way: str) -> Equilibrium | None:
         """The equilibrium at the last of some loads, in patient steps through all; None if one has no equilibrium."""
-        now, evaluations = start, start.evaluations
+        now: Equilibrium | None = start
         for load in loads:
-            found, spent = _newton(engine, now, load, force_tolerance, patient=True)
-            if found is None:
-                return None
-            now, evaluations = found, evaluations + spent
-        return replace(now, evaluations=evaluations, way=way)
+            now = now and _newton(engine, now, load, force_tolerance, patient=True)
+        return now and replace(now, way=way)
 
     routes: list[tuple[str, Equilibrium, list[float]]] = [("more iterations", here, [fx])]
     for count in INCREMENT_PARTS:

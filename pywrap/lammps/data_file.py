@@ -8,12 +8,12 @@ from ...analysis.files.formats.lammps_data import box_lines
 
 def data_file(packing: Packing) -> str:
     """A LAMMPS data file of the disks, type 2 the upper layer; lengths to the bit, masses left to the decks."""
-    x, y = packing.position.T
-    lines = ["faultgouge packing", "", f"{len(packing)} atoms", "2 atom types", *box_lines(packing)]
-    lines += ["", "Atoms # sphere", ""]
-    columns = zip(packing.top.tolist(), (2 * packing.radius).tolist(), x.tolist(), y.tolist(), strict=True)
-    lines += [f"{n} {1 + top} {d!r} 1.0 {a!r} {b!r} 0.0" for n, (top, d, a, b) in enumerate(columns, 1)]
-    return "\n".join(lines) + "\n"
+    columns = packing.top.tolist(), (2 * packing.radius).tolist(), *packing.position.T.tolist()
+    disks = [
+        f"{n} {1 + top} {d!r} 1.0 {x!r} {y!r} 0.0" for n, (top, d, x, y) in enumerate(zip(*columns, strict=True), 1)
+    ]
+    head = ["faultgouge packing", "", f"{len(packing)} atoms", "2 atom types", *box_lines(packing)]
+    return "\n".join([*head, "", "Atoms # sphere", "", *disks, ""])
 
 
 def sort_contacts(path: Path) -> None:
@@ -23,9 +23,6 @@ def sort_contacts(path: Path) -> None:
     """
     lines = path.read_text().splitlines()
     rows = 1 + next(k for k, line in enumerate(lines) if line.startswith("ITEM: ENTRIES"))
-    pairs = []
-    for line in lines[rows:]:
-        first, second, *numbers = line.split()
-        pairs.append((*sorted((int(first), int(second))), *numbers))
-    lines[rows:] = [" ".join(map(str, pair)) for pair in sorted(pairs)]
-    path.write_text("\n".join(lines) + "\n")
+    split = [line.split() for line in lines[rows:]]
+    pairs = sorted([*sorted((int(i), int(j))), *numbers] for i, j, *numbers in split)
+    path.write_text("\n".join([*lines[:rows], *(" ".join(map(str, pair)) for pair in pairs), ""]))

@@ -3,11 +3,8 @@
 import re
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from .instance import EngineError
-from .plain_file_names import DECKS, decks_folder, is_plain
+from .plain_file_names import DECKS, decks_folder
 
 __all__ = ["DECKS", "Decks"]
 
@@ -38,13 +35,12 @@ class Decks:
         self.command(f"include {decks_folder() / deck}")
 
     def variables(self, **values: object) -> None:
-        """Set variables of style index, doubles in full precision; a text is one word that means itself."""
+        """Set variables of style index, doubles in full precision; of what is None there is no variable any more."""
         for name, value in values.items():
-            text = repr(float(value)) if isinstance(value, float) else str(value)
-            if not is_plain(text):
-                raise EngineError(f"LAMMPS would not read {name} = {text!r} as one word: give it another name.")
             self.command(f"variable {name} delete")
-            self.command(f'variable {name} index "{text}"')
+            if value is not None:
+                text = repr(float(value)) if isinstance(value, float) else str(value)
+                self.command(f'variable {name} index "{text}"')
 
     def number(self, variable: str) -> float:
         """The value of a variable."""
@@ -54,9 +50,3 @@ class Decks:
     def steps(self) -> int:
         """Time steps so far."""
         return int(self._lammps.extract_global("ntimestep"))
-
-    def group(self, name: str, disks: ArrayLike) -> None:
-        """Make a group of disks."""
-        members = np.asarray(disks) + 1
-        for part in np.array_split(members, len(members) // 100 + 1):  # an input line has a limit
-            self.command(f"group {name} id {' '.join(map(str, part))}")

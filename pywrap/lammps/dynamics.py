@@ -65,18 +65,8 @@ class Weakening:
 
 
 class Dynamics:
-    """A run under way; its forces at the start are computed.
-
-    Parameters
-    ----------
-    engine : LammpsState
-        LAMMPS, in which deck parts have made the integrator and the forces.
-    packing : Packing
-        From which the run starts.
-    weakening : Weakening, optional
-        Friction that falls with the velocity of the upper layer; constant by default.
-    drawn : bool
-        Whether a spring draws the upper layer.
+    """A run under way from a packing, in a LAMMPS in which deck parts have made the integrator and the forces; its
+    forces at the start are computed. Friction may fall with the velocity of the upper layer, which a spring may draw.
     """
 
     def __init__(self, engine: LammpsState, packing: Packing, weakening: Weakening | None, drawn: bool) -> None:
@@ -90,11 +80,6 @@ class Dynamics:
     def time_step(self) -> float:
         """Time step, time."""
         return float(self._lammps.extract_global("dt"))
-
-    @property
-    def steps(self) -> int:
-        """Time steps so far."""
-        return self._engine.steps
 
     @property
     def drawn(self) -> tuple[float, float]:
@@ -114,7 +99,7 @@ class Dynamics:
         """The last steps of a run, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
         engine = self._engine
         # windows of fix ave/time end at multiples of their length
-        engine.command(f"reset_timestep {(self.steps + steps - 1) // steps * steps}")
+        engine.command(f"reset_timestep {(engine.steps + steps - 1) // steps * steps}")
         engine.include("work.in", work_steps=steps)
         engine.command("run 0 post no")
         first = engine.number("power_now")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
@@ -76,19 +77,16 @@ class Engine(LammpsState):
         self.communicator, law = communicator or MPI.COMM_WORLD, packing.law
         super().__init__(lammps_instance(self.communicator, log), packing)
         self.kept: Trial | None = None  # the trial at which Newton's method has ended
-        with shared_folder(self.communicator) as folder:
-            data = folder / "packing.data"
-            if self.communicator.rank == 0:
-                data.write_text(data_file(packing))
-            self.communicator.barrier()
-            self.variables(
-                decks=decks_folder(), data=data, sides="f" if packing.box_length is None else "p", kn=law.kn, kt=law.kt,
-                mu=law.mu, exponent=law.exponent, history=law.history, fx=packing.fx, fy=packing.fy,
+        data = data_file(packing)
+        with shared_folder(self.communicator, lambda folder: (folder / "data").write_text(data)) as folder:
+            self.include(
+                "system.in", decks=decks_folder(), data=folder / "data",
+                sides="f" if packing.box_length is None else "p", kn=law.kn, kt=law.kt, mu=law.mu,
+                exponent=law.exponent, history=law.history, fx=packing.fx, fy=packing.fy,
                 inertia=packing.inertia_factor, mass=float(packing.mass.min()),
                 diameter=2 * float(packing.radius.min()), precision="compensated" if packing.compensated else "double",
-                **({"cn": law.cn, "ct": law.ct} if law.damped else {}),
+                cn=law.cn if law.damped else None, ct=law.ct if law.damped else None,
             )  # fmt: skip
-            self.include("system.in")
         self.scatter("rmass", packing.mass)
         if law.frictional or packing.compensated:
             self.begin_displacements()
@@ -145,7 +143,7 @@ class Engine(LammpsState):
         gather : float
             Fraction of its height to which the loose packing is first brought down evenly; 1 for not at all.
         viscosity : float, optional
-            Viscosity of the damping, mass / time; by default that of the previous call, or of the decks.
+            Viscosity of the damping, mass / time; by default that of the decks.
         steps : int
             Largest number of time steps in each stage.
         """
@@ -153,9 +151,8 @@ class Engine(LammpsState):
             self.end_displacements()
         else:
             self.restore(start)
-        own = {} if viscosity is None else {"viscosity": viscosity}
-        limits = {"force_tolerance": force_tolerance, "chunk": STEPS_A_LOOK, "chunks": steps // STEPS_A_LOOK}
-        self.variables(**limits, **own)
+        chunks = {"chunk": STEPS_A_LOOK, "chunks": steps // STEPS_A_LOOK}
+        self.variables(force_tolerance=force_tolerance, viscosity=viscosity, **chunks)
         if gather < 1:
             self.include("gather.in", gather=gather)
         self.include("bed.in" if start is None else "damp.in")
@@ -184,12 +181,11 @@ class Engine(LammpsState):
             Largest number of time steps.
         """
         self.end_displacements()
-        self.command("variable relax_step delete")  # the variable of an earlier call
-        start, own = self.steps, {} if time_step is None else {"relax_step": time_step}
-        limits = {"force_tolerance": force_tolerance, "damping": damping, "chunk": chunk, "chunks": steps // chunk}
-        self.include("relax.in", **own, **limits)
-        status = str(self._lammps.extract_variable("relaxed"))
-        return Relaxation(self.number("residual"), status, self.steps - start)
+        start, limits = self.steps, {"force_tolerance": force_tolerance, "chunk": chunk, "chunks": steps // chunk}
+        self.include("relax.in", damping=damping, relax_step=time_step, **limits)
+        found = Relaxation(self.number("residual"), self._lammps.extract_variable("relaxed"), self.steps - start)
+        self.evaluations += found.steps
+        return found
 
     def dump(self, stem: Path) -> None:
         """Write the configuration as LAMMPS dumps in full precision (deck part write.in): STEM.disks and others.
@@ -202,7 +198,6 @@ class Engine(LammpsState):
         self.command("reset_timestep 0")
         with shared_folder(self.communicator) as folder:
             self.include("write.in", name=folder / "dump", fx=self.fx)
-            self.communicator.barrier()
             if self.communicator.rank == 0:
                 sort_contacts(folder / "dump.contacts")
                 move_files(folder, stem)
@@ -253,45 +248,40 @@ class Engine(LammpsState):
             The dynamics, to be continued. Rattlers are held fixed, because nothing would stop them; a layer that a
             spring draws comes past them, and they move.
         """
-        packing, undo = self.packing, []  # commands after which the engine is as before, the last one first
+        packing, pushed, groups = self.packing, "top", {}
         self.end_displacements()
-        mobile, pushed = "all", "top"
         if spring is None and len(packing.rattlers):
-            mobile = "mobile"
-            self.group("still", packing.rattlers)
+            groups["still"] = packing.rattlers
+        if target is not None:
+            pushed, groups["pushed"] = "pushed", np.asarray(target)
+        for name, disks in groups.items():
+            self.command(f"group {name} id {' '.join(map(str, disks + 1))}")
+        undo = [f"group {name} delete" for name in groups]  # after which the engine is as before, the last one first
+        if mobile := "mobile" * ("still" in groups):
             self.command("group mobile subtract all still")
-            undo += ["group still delete", "group mobile delete"]
-        given = {"dt": time_step, "tau": packing.drag_time if drag_time is None else drag_time}
-        self.include("undamped.in", mobile=mobile, **{name: each for name, each in given.items() if each is not None})
+            undo.append("group mobile delete")
+        self.include(
+            "undamped.in",
+            mobile=mobile or "all",
+            dt=time_step,
+            tau=packing.drag_time if drag_time is None else drag_time,
+        )
         if packing.law.damped:
             law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
             # `explain` takes the floor away
-            undo += [
-                'if "$(is_defined(fix,floor))" then "fix_modify floor damping no"',
-                f"pair_style mindlin/smooth {law}",
-            ]
+            undo.append('if "$(is_defined(fix,floor))" then "fix_modify floor damping no"')
+            undo.append(f"pair_style mindlin/smooth {law}")
         undo += ["variable tau delete", "unfix move"]
         if spring is not None:
-            far_end = {"velocity": stages[0][0]} if len(stages) == 1 else {}
-            if not far_end:
-                words = " ".join(f"{velocity!r} {time!r}" for velocity, time in stages)
-                self.command(f'variable protocol index "{words}"')
-            self.include("spring.in", spring=spring, **far_end)
-            self.command("variable protocol delete")
+            one, several = stages[0][0], " ".join(f"{velocity!r} {time!r}" for velocity, time in stages)
+            self.include("spring.in", spring=spring, velocity=one, protocol=several if len(stages) > 1 else None)
             undo.append("unfix drive")
-        if target is not None:
-            pushed = "pushed"
-            self.group(pushed, target)
-            undo.append("group pushed delete")
         if amplitude != 0:
             self.include("push.in", amplitude=amplitude, omega=omega, target=pushed)
             undo.append("unfix push")
         if signal is not None:
-            with shared_folder(self.communicator) as folder:
-                if self.communicator.rank == 0:
-                    write_table(signal, folder / "signal.txt")
-                self.communicator.barrier()
-                self.include("signal.in", signal=folder / "signal.txt", scale=1.0, stretch=1.0, on=on, target=pushed)
+            with shared_folder(self.communicator, lambda folder: write_table(signal, folder / "signal")) as folder:
+                self.include("signal.in", signal=folder / "signal", scale=1.0, stretch=1.0, on=on, target=pushed)
             undo.append("unfix force")
         yield Dynamics(self, packing, weakening, drawn=spring is not None)
         for command in reversed(undo):

@@ -15,13 +15,7 @@ class EngineError(FaultgougeError):
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
-    """Start LAMMPS as `start_lammps` does, with the plugin.
-
-    Raises
-    ------
-    EngineError
-        If LAMMPS does not see these ranks, or does not take the plugin.
-    """
+    """Start LAMMPS as `start_lammps` does, with the plugin; EngineError if LAMMPS does not take the plugin."""
     instance = start_lammps(communicator, log, *options)
     load_plugin(instance)
     return instance
@@ -49,12 +43,11 @@ def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any
     """
     from lammps import lammps
 
-    arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none", *options]
-    instance = lammps(cmdargs=arguments, comm=communicator)
-    if instance.extract_setting("world_size") != communicator.size:
+    instance = lammps(cmdargs=["-nocite", "-screen", "none", "-log", str(log or "none"), *options], comm=communicator)
+    if (seen := instance.extract_setting("world_size")) != communicator.size:
         raise EngineError(
-            f"LAMMPS runs on {instance.extract_setting('world_size')} ranks and this program on {communicator.size}: "
-            "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
+            f"LAMMPS runs on {seen} ranks and this program on {communicator.size}: their MPI libraries differ, so use "
+            "one rank, or a LAMMPS built with the MPI of mpi4py"
         )
     return instance
 
@@ -64,13 +57,11 @@ def load_plugin(instance: Any) -> None:
 
     Raises EngineError if this LAMMPS does not take the plugin.
     """
-    if instance.has_style("pair", "mindlin/smooth"):
-        return
-    plugin = Path(directory()) / "mindlinsmoothplugin.so"
-    if plugin.is_file():
+    plugin, style = Path(directory()) / "mindlinsmoothplugin.so", ("pair", "mindlin/smooth")
+    if not instance.has_style(*style) and plugin.is_file():
         with plain_name(plugin) as name:
             instance.command(f"plugin load {name}")
-    if not instance.has_style("pair", "mindlin/smooth"):
+    if not instance.has_style(*style):
         why = "was built for another release, MPI or size of atom IDs" if plugin.is_file() else "is not there"
         raise EngineError(
             f"LAMMPS {instance.version()} does not take the plugin {plugin}, which {why}: build the plugin for this "

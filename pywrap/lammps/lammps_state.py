@@ -18,7 +18,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts, Packing, touching
 from ...analysis.arrays import Floats
@@ -55,18 +54,19 @@ class LammpsState(Decks):
     ----------
     fx : float
         Force along x on each disk of the upper layer.
+    evaluations : int
+        Forces computed for displacements and relaxations so far.
     """
 
     def __init__(self, lammps: Any, packing: Packing) -> None:
         super().__init__(lammps)
-        self._static, self.fx = packing, packing.fx
+        self._static, self.fx, self._angle = packing, packing.fx, packing.angle  # LAMMPS has no angles without friction
         self._levers = np.stack([np.ones(len(packing)), np.ones(len(packing)), packing.radius])  # of forces and moves
         self._slip_width = 3 if packing.compensated else 2
         self._floor_columns = (FLOOR_SLIP_LOW if packing.compensated else FLOOR_OVERLAP) + 1
-        self._displacing = False  # whether fix displace/disc is there
-        self._set_up = False  # whether LAMMPS is, for the next displacement
-        self._angle = packing.angle  # LAMMPS has none without friction
-        self._known: tuple[Packing, dict[str, Floats]] | None = None
+        self._displacing = self._set_up = False  # whether fix displace/disc is there, and LAMMPS set up for the next
+        self.evaluations = 0
+        self._written: tuple[Packing, dict[str, Floats]] | None = None
         self._contacts_seen = b""  # partners and who is on the floor, of _graph
 
     def set_fx(self, fx: float) -> None:
@@ -81,12 +81,14 @@ class LammpsState(Decks):
         """Make the fix that displaces, unless it is there."""
         if self._displacing:
             return
-        self.command("timestep 1.0")
-        self.command(f"variable load internal {self.fx!r}")
-        self.command(f"fix load top addforce v_load {-self._static.fy!r} 0.0")
         rotation = "yes" if self._static.law.frictional else "no"
-        compensated = " compensated" * self._static.compensated
-        self.command(f"fix move all displace/disc rotation {rotation}{compensated}")
+        for command in (
+            "timestep 1.0",
+            f"variable load internal {self.fx!r}",
+            f"fix load top addforce v_load {-self._static.fy!r} 0.0",
+            f"fix move all displace/disc rotation {rotation}{' compensated' * self._static.compensated}",
+        ):
+            self.command(command)
         self._displacing, self._set_up = True, False
 
     def end_displacements(self) -> None:
@@ -100,9 +102,8 @@ class LammpsState(Decks):
     def displace(self, base: Packing, displacement: Floats) -> Packing:
         """Move the disks from a configuration along a straight path and advance the slips along it.
 
-        For LAMMPS the displacement is the motion in one time step of length one. The result does not depend on the
-        configuration before the call: any number of trials may start from one base, and each is bitwise independent of
-        the others.
+        The result does not depend on the configuration before the call: any number of trials may start from one base,
+        and each is bitwise independent of the others.
 
         Parameters
         ----------
@@ -124,26 +125,26 @@ class LammpsState(Decks):
         self.write(base, (displacement.reshape(3, -1) / self._levers).T)
         setup, self._set_up = "pre no " if self._set_up else "", False
         self.command(f"run 1 {setup}post no")
-        self._set_up = True
+        self._set_up, self.evaluations = True, self.evaluations + 1
         return self.read(displacement)
 
     def write(self, packing: Packing, velocity: Floats | None = None) -> None:
         """Positions, angles and slips of a packing, and velocities (v_x, v_y, omega), shape (N, 3), or none; they take
         effect at the next run's setup."""
-        if self._known is None or self._known[0] is not packing:
-            self._known = packing, self._arrays_of(packing)
-        arrays = dict(self._known[1])
-        state = arrays.pop("f_move")
-        if packing.law.frictional:
+        if self._written is None or self._written[0] is not packing:
+            self._written = packing, self._arrays_of(packing)
+        arrays, frictional = self._written[1], packing.law.frictional
+        if frictional:
             arrays["f_slips"] = self._of_width(arrays["f_slips"])
         else:
             self._angle = packing.angle if velocity is None else packing.angle + velocity[:, 2]
         if self._displacing:
+            state = arrays["f_move"]
             state[:, GIVEN_COLUMN], state[:, VELOCITY_COLUMNS] = 1.0, 0.0 if velocity is None else velocity
-            arrays["f_move"] = state
         else:
-            arrays["x"] = np.column_stack([packing.position, np.zeros(len(packing))])
-            arrays |= {"d_theta": packing.angle} if packing.law.frictional else {}
+            x = np.column_stack([packing.position, np.zeros(len(packing))])
+            arrays = {**arrays, "x": x} | ({"d_theta": packing.angle} if frictional else {})
+            del arrays["f_move"]
         for name, values in arrays.items():
             self.scatter(name, values)
 
@@ -184,7 +185,7 @@ class LammpsState(Decks):
         missing = self._columns_of("slips") - slips.shape[1]
         if missing < 0:
             self.command(f"fix_modify slips capacity {(slips.shape[1] - 1) // self._slip_width}")
-        return np.hstack([slips, np.zeros((len(slips), missing))]) if missing > 0 else slips
+        return np.pad(slips, ((0, 0), (0, missing))) if missing > 0 else slips
 
     def read(self, displacement: Floats | None = None) -> Trial:
         """All that LAMMPS has, at the end of a displacement of shape (3N,)."""
@@ -196,20 +197,18 @@ class LammpsState(Decks):
         else:
             angle, contacts = self._angle, touching(position, static.radius, static.box_length)
             graph, slip, slip_low = ContactGraph(contacts, static.radius), contacts.slip, None
-        return Trial(static, self.fx, position, low, angle, graph, slip, slip_low, self._forces(columns), displacement)
+        force = np.divide(columns[:, FORCE_COLUMNS].T, self._levers, order="C").ravel()
+        return Trial(static, self.fx, position, low, angle, graph, slip, slip_low, force, displacement)
 
     @property
     def net_force(self) -> Floats:
         """Forces in LAMMPS, (Fx.., Fy.., T/R..), shape (3N,), load included."""
-        return self._forces(self._state_columns())
+        return self.read().force
 
     def motion(self) -> tuple[Floats, Floats | None, Floats]:
         """Positions, their low parts in compensated arithmetic, and velocities (v_x, v_y, omega)."""
         columns = self._state_columns()
         return *self._positions(columns), columns[:, VELOCITY_COLUMNS]
-
-    def _forces(self, columns: Floats) -> Floats:
-        return np.divide(columns[:, FORCE_COLUMNS].T, self._levers, order="C").ravel()
 
     def _positions(self, columns: Floats) -> tuple[Floats, Floats | None]:
         """Coordinates and their low parts, if there are any, as packings have them."""
@@ -263,23 +262,21 @@ class LammpsState(Decks):
         """Write the result of `checkpoint` back into LAMMPS."""
         for name, values in arrays.items():
             self.scatter(name, self._of_width(values) if name == "f_slips" else values)
-        self._known = None
 
     def gather(self, name: str, columns: int) -> Floats:
         """An array of LAMMPS (x, v, f ..., f_FIX, d_NAME), shape (N, columns)."""
         values = np.empty((len(self._static), columns), np.int32 if name == PERIODS_AWAY else np.float64)
-        self._transfer("gather", name, values, columns)
+        self._transfer("gather", name, values)
         return values.astype(np.float64, copy=False)
 
     def scatter(self, name: str, values: Floats) -> None:
         """Write an array of LAMMPS, shape (N,) or (N, columns); arrays of fixes take effect with the next run."""
-        whole = np.ascontiguousarray(values, dtype=np.int32 if name == PERIODS_AWAY else np.float64)
-        self._transfer("scatter", name, whole, values.size // len(self._static))
+        self._transfer("scatter", name, np.ascontiguousarray(values, np.int32 if name == PERIODS_AWAY else np.float64))
 
-    def _transfer(self, way: str, name: str, values: NDArray[Any], columns: int) -> None:
+    def _transfer(self, way: str, name: str, values: Any) -> None:
         library, instance = self._lammps.lib, self._lammps.lmp
         function = f"lammps_{way}" if name[:2] in ("f_", "d_") else f"lammps_{way}_atoms"
-        double = int(name != PERIODS_AWAY)  # LAMMPS's number of the type
+        double, columns = int(name != PERIODS_AWAY), values.size // len(values)  # LAMMPS's number of the type
         getattr(library, function)(instance, name.encode(), double, columns, values.ctypes.data)
         if library.lammps_has_error(instance):
             raise self._lammps._lammps_exception

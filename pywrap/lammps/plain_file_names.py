@@ -11,7 +11,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from importlib.resources import files
@@ -27,19 +27,11 @@ DECKS = Path(str(files("faultgouge.lammps_inputs")))
 PLAIN = re.compile(r"[A-Za-z0-9_./+:@=~-]*")
 """Characters that mean themselves in every command of LAMMPS."""
 
-OTHER_FOLDERS = "/tmp", "/var/tmp", "/dev/shm"
-"""Where temporary files lie if the name of Python's own place is not plain."""
-
-
-def is_plain(text: str) -> bool:
-    """Whether LAMMPS reads a text as one word that means itself."""
-    return PLAIN.fullmatch(text) is not None
-
 
 def temporary_folder() -> tempfile.TemporaryDirectory[str]:
     """A new folder of a plain name, which goes when it is left. Raises FaultgougeError if there is no place for one."""
-    for place in (tempfile.gettempdir(), *OTHER_FOLDERS):
-        if is_plain(place) and os.access(place, os.W_OK | os.X_OK):
+    for place in (tempfile.gettempdir(), "/tmp", "/var/tmp", "/dev/shm"):
+        if PLAIN.fullmatch(place) and os.access(place, os.W_OK | os.X_OK):
             return tempfile.TemporaryDirectory(prefix="faultgouge-", dir=place)
     raise FaultgougeError(
         f"temporary files cannot lie in {tempfile.gettempdir()!r}, a name that LAMMPS would not read as one word: set "
@@ -48,10 +40,12 @@ def temporary_folder() -> tempfile.TemporaryDirectory[str]:
 
 
 @contextmanager
-def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
-    """A temporary folder of rank 0, of a plain name, that all ranks know."""
+def shared_folder(communicator: MPI.Comm, fill: Callable[[Path], object] | None = None) -> Iterator[Path]:
+    """A temporary folder of rank 0, of a plain name, that all ranks know, with the files that rank 0 puts there."""
     keeper = temporary_folder() if communicator.rank == 0 else None
     try:
+        if keeper and fill:
+            fill(Path(keeper.name))
         yield Path(communicator.bcast(keeper.name if keeper else None))
         communicator.barrier()  # not after an error, which one rank may be alone with
     finally:
@@ -63,14 +57,13 @@ def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
 def plain_name(path: Path) -> Iterator[Path]:
     """A plain name of an existing file: its own name, or the name of a link to the file."""
     whole = Path(os.path.realpath(path))
-    with ExitStack() as kept:
-        name = whole
-        if not is_plain(str(whole)):
-            name = (
-                Path(kept.enter_context(temporary_folder())) / f"file{whole.suffix if is_plain(whole.suffix) else ''}"
-            )
-            name.symlink_to(whole)
-        yield name
+    if PLAIN.fullmatch(str(whole)):
+        yield whole
+        return
+    with temporary_folder() as folder:
+        link = Path(folder) / f"file{whole.suffix if PLAIN.fullmatch(whole.suffix) else ''}"
+        link.symlink_to(whole)
+        yield link
 
 
 @cache
@@ -82,20 +75,13 @@ def decks_folder() -> Path:
 
 
 def move_files(folder: Path, stem: Path) -> None:
-    """Move the files of a folder, KIND each by its suffix, to STEM.KIND.
+    """Move the files of a folder, KIND each by its suffix, to STEM.KIND; the parameters, which have a mark, first.
 
-    Raises OutputError if a file of such a name is there that does not begin as the new one: of dumps, with the columns.
+    Raises OutputError if a file of such a name is there, and no parameters beside it that this program has written.
     """
-    moved = {file: Path(f"{stem}{file.suffix}") for file in sorted(folder.iterdir())}
-    for file, target in moved.items():
-        if target.exists() and _head(target) != _head(file):
-            check_own(target)
+    moved = {file: Path(f"{stem}{file.suffix}") for file in sorted(folder.iterdir(), reverse=True)}
+    marked = [target for target in moved.values() if target.suffix == ".params" and target.exists()]
+    for target in marked or moved.values():
+        check_own(target)
     for file, target in moved.items():
         shutil.move(file, target)
-
-
-def _head(path: Path) -> list[bytes]:
-    """How a dump begins, or a file of parameters: the names that are in it."""
-    with path.open("rb") as stream:
-        lines = [stream.readline(1 << 16) for _ in range(9)]
-    return [line.strip() for line in lines if line.startswith(b"ITEM:")] or [line.split()[:1][0] for line in lines[:3]]

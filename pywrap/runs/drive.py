@@ -50,8 +50,8 @@ one to the next, and way of a rigid drive in smallest diameters."""
 SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 """Rows of the series: so many in a period of the layer on the spring, and at least so many in a part of the run."""
 
-MOST_STEPS, MOST_STEPS_OF_RUN = 2**53, 2**31 - 1
-"""Time steps of a run at the most, which its time, a double, counts exactly; and of one command `run` of LAMMPS."""
+MOST_STEPS_OF_RUN = 2**31 - 1
+"""Time steps of one command `run` of LAMMPS at the most."""
 
 LEAST_LOADING_PERIODS, REFUSED_LOADING_PERIODS = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
@@ -122,32 +122,23 @@ class DriveCheckpoint(Checkpoint):
     pending: tuple[DriveState, ...] = ()
 
 
-class DilationError(FaultgougeError):
-    """The layer has left the bed."""
-
-
-def strength(packing: Packing) -> float:
-    """mu F_y, the largest force along x that friction bears on each disk of the layer; F_y without friction."""
-    return float((packing.law.mu or 1.0) * packing.fy)
-
-
 def layer_period(settings: Drive, packing: Packing) -> float | None:
     """Period of the layer on the spring, time; None of a rigid drive."""
-    if settings.spring == "rigid":
-        return None
-    return float(2 * math.pi * np.sqrt(packing.mass[packing.top].mean() / settings.spring))
+    mass, spring = packing.mass[packing.top].mean(), settings.spring
+    return None if spring == "rigid" else float(2 * math.pi * np.sqrt(mass / spring))
 
 
 def steps_of(settings: Drive, start: Packing, dt: float) -> tuple[int, int, int]:
     """Time steps between two stored states, between two rows, and of the whole run, from an equilibrium."""
+    bears, period = start.law.mu * start.fy, layer_period(settings, start)
     if settings.spring == "rigid":
         between = float(MOVED_DIAMETERS * 2 * start.radius.min() / settings.fastest)
     else:
-        between = LOADED_SHARE * strength(start) / (settings.spring * settings.fastest)
-    part, period = math.ceil(min((settings.states or between) / dt, MOST_STEPS)), layer_period(settings, start)
+        between = LOADED_SHARE * bears / (settings.spring * settings.fastest)
+    part = math.ceil((settings.states or between) / dt)
     most = max(1, min(part // SAMPLES_A_PART, MOST_STEPS_OF_RUN))
     every = most if period is None else min(most, max(1, int(period / SAMPLES_A_PERIOD / dt)))
-    return part, every, math.ceil(settings.length(strength(start)) / dt)
+    return part, every, math.ceil(settings.length(bears) / dt)
 
 
 def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: Watch | None = None) -> Packing:
@@ -173,20 +164,20 @@ def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: 
         If the packing does not settle.
     """
     section = scene.packing
-    if isinstance(section, GeneratedPacking) and section.settle_friction:
+    if not isinstance(section, GeneratedPacking):
+        packing = settle_bed(scene)
+    elif section.settle_friction:
         return settle(scene, communicator=communicator, watch=watch).packing
-    if isinstance(section, GeneratedPacking):
+    else:
         packing = settle(scene.model_copy(update={"precision": "double"}), 0.0, communicator, watch).packing
         contacts = packing.contacts.slipped(np.zeros(len(packing.contacts)))
-        packing = replace(packing, law=law_of(scene, scene.law.mus[0]), contacts=contacts)
-    else:
-        packing = settle_bed(scene)
+        packing = replace(packing, law=law_of(scene), contacts=contacts)
     if scene.precision == "double":
         return packing
     contacts, low = packing.contacts, packing.position_low
-    if contacts.slip_low is None:
-        contacts = contacts.slipped(contacts.slip, np.zeros(len(contacts)))
-    return replace(packing, contacts=contacts, position_low=np.zeros_like(packing.position) if low is None else low)
+    slip_low = np.zeros(len(contacts)) if contacts.slip_low is None else contacts.slip_low
+    low = np.zeros_like(packing.position) if low is None else low
+    return replace(packing, contacts=contacts.slipped(contacts.slip, slip_low), position_low=low)
 
 
 def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = None) -> list[str]:
@@ -195,25 +186,19 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     Raises SceneError if the drive is not slow against the vibrations of the layer, or the time steps of the deck do not
     follow signal, spring and dashpots.
     """
-    settings = require_section(scene.drive, "drive")
+    settings, bears = require_section(scene.drive, "drive"), start.law.mu * start.fy
     fastest, spring, omega = settings.fastest, settings.spring, settings.omega
-    rigid, signal = spring == "rigid", None if settings.signal == "pulse" else settings.forcing()
     with Engine(start, communicator) as engine, engine.undamped(spring=spring, stages=settings.stages) as dynamics:
         dt = dynamics.time_step
-    shortest = math.inf if signal is None else signal.shortest
-    steps, period = settings.length(strength(start)) / dt, 2 * math.pi / omega if omega else math.inf
-    own = float(stable_timestep(start))
-    limit = own if isinstance(spring, str) else float(stable_timestep(replace(start, spring=spring)))
+    signal = None if settings.signal == "pulse" else settings.forcing()
+    shortest, period = math.inf if signal is None else signal.shortest, 2 * math.pi / omega if omega else math.inf
+    limit = float(stable_timestep(start if spring == "rigid" else replace(start, spring=spring)))
     follows = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
     refusals = {
-        f"the run would take {steps:.1g} time steps of {dt:.3g}, which no machine does: give a shorter drive.until, "
-        "or a faster drive": steps > MOST_STEPS,
         f"drive.omega = {omega} has a period of {period:.3g}, {follows}": period < 10 * dt,  # sampled to some per cent
         f"drive.signal has rows that are {shortest:.3g} apart, {follows}": shortest < dt,
-        f"the layer moves at {fastest:g} by {fastest * dt:.3g} in a time step of {dt:.3g}, farther than the smallest "
-        f"radius {start.radius.min():g}: lower drive.velocity": rigid and fastest * dt > start.radius.min(),
         f"the time step of the run is {dt:.3g}, and the limit {limit:.3g}, above which every run of this packing blows "
-        f"up: lower {'damping.cn and damping.ct' if dt >= own else 'drive.spring'}": dt >= limit,
+        "up: lower damping.cn and damping.ct, or drive.spring": dt >= limit,
     }
     for says, bad in refusals.items():
         if bad:
@@ -221,21 +206,17 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     if spring == "rigid":
         return []
     slowest = nearest_modes(start, 0.0, 1).values.real.min()
-    period = 2 * math.pi / math.sqrt(max(slowest, np.finfo(float).tiny))
-    loading = strength(start) / (spring * fastest)
+    loading = bears / (spring * fastest)
+    periods = loading * math.sqrt(max(slowest, np.finfo(float).tiny)) / (2 * math.pi)
     says = (
-        f"drive.velocity = {fastest:g} loads the layer to mu F_y in {loading:.3g}, which is "
-        f"{loading / period:.2g} periods of its slowest vibration"
+        f"drive.velocity = {fastest:g} loads the layer to mu F_y in {loading:.3g}, which is {periods:.2g} periods of "
+        f"its slowest vibration"
     )
-    if loading < REFUSED_LOADING_PERIODS * period:
-        slow = fastest * loading / (LEAST_LOADING_PERIODS * period)
-        needed = (
-            f"slow driving takes {LEAST_LOADING_PERIODS:g} or more: lower it to {slow:.1g}, or take a softer spring"
-        )
-        raise SceneError(f"{says}, and {needed}")
-    return [f"{says}: slow driving takes {LEAST_LOADING_PERIODS:g} or more"] * (
-        loading < LEAST_LOADING_PERIODS * period
-    )
+    needs = f"slow driving takes {LEAST_LOADING_PERIODS:g} or more"
+    if periods < REFUSED_LOADING_PERIODS:
+        slow = fastest * periods / LEAST_LOADING_PERIODS
+        raise SceneError(f"{says}, and {needs}: lower it to {slow:.1g}, or take a softer spring")
+    return [f"{says}: {needs}"] * (periods < LEAST_LOADING_PERIODS)
 
 
 def drive(
@@ -272,10 +253,8 @@ def drive(
     ------
     SceneError
         As of `check_drive`, of a packing that settles here.
-    DilationError
-        If the layer leaves the bed.
-    EngineError
-        If disks move through one another.
+    FaultgougeError
+        If the layer leaves the bed, or, an EngineError, disks move through one another.
 
     Examples
     --------
@@ -299,19 +278,14 @@ def drive(
         """The slip that a row ends; a rigid layer never sticks, and has none."""
         return detector.add(row.time, row.force, row.displacement, row.kinetic_energy) if detector else None
 
-    slips, last = sum(ended(row) is not None for row in known), resume.step if resume else 0
-    forces: dict[str, Any] = {
-        "spring": settings.spring,
-        "stages": settings.stages,
-        "signal": settings.forcing(),
-        "on": settings.on,
-    }
-    with Engine(start, communicator) as engine, engine.undamped(**forces) as dynamics:
+    slips, last, pending = sum(ended(row) is not None for row in known), 0, resume.pending if resume else ()
+    forces: dict[str, Any] = {"stages": settings.stages, "signal": settings.forcing(), "on": settings.on}
+    with Engine(start, communicator) as engine, engine.undamped(spring=settings.spring, **forces) as dynamics:
         dt = dynamics.time_step
         part, every, total = steps_of(settings, start, dt)
-        pending = resume.pending if resume else ()
         wanted = {state.time for state in pending if round(state.time / dt) % part == 0}  # times of stored states
         if resume is not None:
+            last = resume.step
             dynamics.resume(last, resume.state)
         while last < total:
             step = min(total, last - last % every + every, last - last % part + part)
@@ -327,16 +301,17 @@ def drive(
             energy, at_bound = motion.kinetic_energy(start), int(np.count_nonzero(packing.sliding))
             sample = DriveSample(time, force, displacement, thickness, energy, at_bound)
             if thickness > 1.5 * height:
-                raise DilationError(
+                raise FaultgougeError(
                     f"the upper layer has left the bed at t = {time:g}: its mean height is {thickness:.3g}, and was "
                     f"{height:.3g}; take a slower drive, a softer spring or a larger load.fy"
                 )
             slip = ended(sample)
+            under_way = detector.so_far if detector else None
             slips += slip is not None
-            is_over = step == total or slips == settings.slips
+            is_over, ends_part = step == total or slips == settings.slips, step % part == 0
             wanted |= {slip.begins, slip.ends} if slip else set()
-            wanted |= {detector.so_far.begins} if detector and detector.so_far else set()
-            wanted |= {time} if is_over or step % part == 0 else set()
+            wanted |= {under_way.begins} if under_way else set()
+            wanted |= {time} if is_over or ends_part else set()
             undecided = detector.undecided if detector and not is_over else set()
             states = [*pending, DriveState(time, displacement, packing)]
             states = [each for each in states if each.time in wanted | undecided]
@@ -345,7 +320,7 @@ def drive(
             yield DriveStep(sample, slip, tuple(states[:decided]))
             if is_over:
                 return
-            if step % part == 0:
+            if ends_part:
                 engine.include("stray.in")
                 reached = dynamics.state()
                 dynamics.resume(step, reached)  # as a run does that is continued from here
@@ -367,19 +342,8 @@ def drive_of(file: RunFile) -> Drive | None:
     return Drive.model_validate(json.loads(file.attributes["scene"])["drive"])
 
 
-def series_and_slips(file: RunFile) -> tuple[dict[str, NDArray[Any]], list[Slip]] | None:
-    """The series of a drive.h5 and its slips that have ended; None of another file, or where the run has not begun."""
-    begun = drive_of(file) is not None and SERIES in file.names_of_series
-    return (file.series(SERIES), slips_in(file)) if begun else None
-
-
-def slips_in(file: RunFile) -> list[Slip]:
-    """The slips in the series of a drive.h5 that have ended."""
-    return all_slips_in(file)[0]
-
-
-def all_slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
-    """The slips in the series of a drive.h5, with the slip that is under way at its end."""
+def slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
+    """The slips in the series of a drive.h5 that have ended, and the slip that is under way at its end."""
     settings = drive_of(file)
     period = None if settings is None else layer_period(settings, file.packing(0))
     if settings is None or period is None or SERIES not in file.names_of_series:
@@ -407,7 +371,7 @@ def clock_advance(path: Path, other: Path) -> float | None:
     with RunFile(path) as with_signal, RunFile(other) as without:
         settings = drive_of(with_signal)
         assert settings is not None
-        return advance_of(slips_in(with_signal), slips_in(without), settings.at or 0.0)
+        return advance_of(slips_in(with_signal)[0], slips_in(without)[0], settings.at or 0.0)
 
 
 def advance_of(slips: Sequence[Slip], without: Sequence[Slip], at: float) -> float | None:

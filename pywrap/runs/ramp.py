@@ -100,7 +100,7 @@ def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iter
     """
     step = min(step_of(scene), fx) or step_of(scene)  # one increment, where the first one of the ramp were too large
     settings = scene.ramp or Ramp(step=step, until=step)
-    settings = settings.model_copy(update={"step": step, "until": max(fx, step)})
+    settings = settings.model_copy(update={"step": step, "until": fx or step})
     scene = scene.model_copy(update={"ramp": settings})
     for last in ramp(scene, communicator=communicator):
         yield last

@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from ...analysis import RunFile, solid_fraction
 from ...analysis.arrays import Floats
+from ...analysis.counted import counted
 from ...analysis.files.atomic_write import check_output, lock_output, replace_whole
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
@@ -77,33 +78,28 @@ class Record:
         task: Task = "ramp",
         saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
-        self.path, self.scene, self.task = path, scene, task
+        self.path, self.scene, self.task, self._said = path, scene, task, saved
         self.communicator = communicator or MPI.COMM_WORLD
         self._file: RunFile | None = None
         self._decided = 1  # frames of a driven run that are not pending
-        self._said = saved
-        self._alone = ExitStack()
-        try:
-            self.last: Equilibrium | None = raise_on_all_ranks(self.communicator, self._resume)
-        except BaseException:
-            self._alone.close()
-            raise
+        with ExitStack() as alone:  # until the file is closed; at once after an error
+            self.last: Equilibrium | None = raise_on_all_ranks(self.communicator, lambda: self._resume(alone))
+            self._alone = alone.pop_all()
 
-    def _resume(self) -> Equilibrium | None:
+    def _resume(self, alone: ExitStack) -> Equilibrium | None:
         """Open the file, if it is there and of this scene and task; the equilibrium from which the run goes on."""
         check_output(self.path)
-        self._alone.enter_context(lock_output(self.path))
+        alone.enter_context(lock_output(self.path))
         if not self.path.exists():
             return None
         file = RunFile(self.path, "a")
         stored, files = (json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files"))
+        task, cure = file.attributes.get("task", "ramp"), "give another name with -o, or delete it"
         difference = _difference(stored, self.scene.resolved(), self.task)
         for key, content in ({} if difference else self.scene.digests()).items():
             if files.get(key, content) != content:  # an older version kept none
                 names = " and ".join(path.name for path in self.scene.files[key])
-                difference = f"{key}, {names}, has another content now"
-                break
-        task, cure = file.attributes.get("task", "ramp"), "give another name with -o, or delete it"
+                difference = difference or f"{key}, {names}, has another content now"
         if difference:
             raise SceneError(f"{self.path} holds a run of another scene ({difference}): {cure}")
         if task != self.task:
@@ -131,7 +127,7 @@ class Record:
     @property
     def slips(self) -> int:
         """Slips of a driven run in the file so far; 0 on ranks that do not write."""
-        return 0 if self._file is None else len(slips_in(self._file))
+        return 0 if self._file is None else len(slips_in(self._file)[0])
 
     def finish(self) -> None:
         """Mark the run as complete."""
@@ -144,15 +140,15 @@ class Record:
 
     def append(self, equilibrium: Equilibrium) -> None:
         """Write one equilibrium, or the packing from which a driven run starts."""
-        self.last = equilibrium
+        self.last, packing = equilibrium, equilibrium.packing
         if self.communicator.rank != 0:
             return
-        scene, packing = self.scene.resolved(), equilibrium.packing
+        scene, files = self.scene.resolved(), self.scene.digests()
         if self._file is None:
             attributes: dict[str, str | int | float] = {
                 "task": self.task,
                 "scene": json.dumps(scene),
-                "files": json.dumps(self.scene.digests()),
+                "files": json.dumps(files),
                 "seed": getattr(self.scene.packing, "seed", -1),
                 "ranks": self.communicator.size,
                 "solid_fraction": solid_fraction(packing),
@@ -165,7 +161,7 @@ class Record:
             known = {name: json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files")}
             if (whole := json.dumps(known["scene"] | scene)) != file.attributes.get("scene"):
                 file.put_attribute("scene", whole)  # a ramp goes on from a file of `settle`, or further
-                file.put_attribute("files", json.dumps(self.scene.digests() | known["files"]))
+                file.put_attribute("files", json.dumps(files | known["files"]))
             if self.task == "drive":
                 file.append(packing, time=0.0, displacement=0.0)
             else:
@@ -215,8 +211,8 @@ class Record:
             samples.clear()
             motions.clear()
 
-        options: dict[str, Any] = {"weakening": weakening, "watch": watch, "keep": keep, "resume": checkpoint}
-        for sample in perturb(scene, start, communicator=self.communicator, **options):
+        options: dict[str, Any] = {"watch": watch, "keep": keep, "resume": checkpoint}
+        for sample in perturb(scene, start, communicator=self.communicator, weakening=weakening, **options):
             samples.append(sample)
             yield sample
         keep(None)
@@ -281,9 +277,8 @@ class Record:
         """Lines of a series so far, and the state after them."""
         if self._file is None or name not in self._file.names_of_series:
             return [], None
-        columns = self._file.series(name)
-        rows = zip(*(columns[key].tolist() for key in columns), strict=True)
-        state = self._file.checkpoint
+        columns, state = self._file.series(name), self._file.checkpoint
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         samples = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
         return samples, Checkpoint(int(state.pop("step")), state) if state else None
 
@@ -307,14 +302,12 @@ class Record:
                 for state in states:
                     file.append(state.packing, time=state.time, displacement=state.displacement)
             if samples:
-                columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
-                file.append_series(name, **columns)
+                file.append_series(name, **{key: [vars(each)[key] for each in samples] for key in vars(samples[0])})
             if motions:
-                low = [motion.position_low for _, motion in motions if motion.position_low is not None]
-                times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
-                file.append_trajectory(times, positions, low or None)
-            state_now: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
-            file.put_checkpoint(**state_now)
+                times, seen = zip(*motions, strict=True)
+                low = [motion.position_low for motion in seen if motion.position_low is not None]
+                file.append_trajectory(times, [motion.position for motion in seen], low or None)
+            file.put_checkpoint(**({} if reached is None else {"step": reached.step, **reached.state}))
         self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
 
     def _say_saved(self, more: str = "") -> None:
@@ -322,9 +315,10 @@ class Record:
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
-        what = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
         if self.task == "drive":
-            what = f"{len(file)} state{'s' * (len(file) != 1)}, the last at t = {file.observable('time')[-1]:g}"
+            what = f"{counted(len(file), 'state')}, the last at t = {file.observable('time')[-1]:g}"
+        else:
+            what = f"{counted(len(file), 'equilibrium', 'equilibria')}, the last at F_x = {file.fx[-1]:g}"
         goes_on = ", and is complete" if file.complete else "; the same command continues from there"
         self._said(f"{self.path} holds {what}{more}{goes_on}", self.path)
 
@@ -368,16 +362,14 @@ def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> s
     stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
     may_lack = {"relax", "ramp", "output"} if task == "ramp" else set()
     for section in sorted(stored.keys() | wanted.keys()):
-        here, there = stored.get(section), wanted.get(section)
-        if section in may_lack and None in (here, there):
-            continue
+        here, there = wanted.get(section), stored.get(section)
         if isinstance(here, dict) and isinstance(there, dict):
             fields = {key: field for model in SECTIONS.get(section, ()) for key, field in model.model_fields.items()}
+            usual = {key: None if field.is_required() else field.default for key, field in fields.items()}
             for key in sorted((here.keys() | there.keys()) - ({"until"} if section == "ramp" else set())):
-                usual = fields[key].default if key in fields and not fields[key].is_required() else None
-                old, new = here.get(key, usual), there.get(key, usual)
+                old, new = (each.get(key, usual.get(key)) for each in (there, here))
                 if old != new:
                     return f"{section}.{key} is {old} there and {new} here"
-        elif here != there:
-            return f"{section} is {'there' if here is not None else 'missing there'}"
+        elif here != there and not (section in may_lack and None in (here, there)):
+            return f"{section} is {'there' if there is not None else 'missing there'}"
     return ""

@@ -98,15 +98,13 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     """
     # the frequency of a small packing is right to the last digit
     limit = float(stable_timestep(packing if packing.law.damped else largest_frequency(packing)))
-    if wanted is None:
-        return ACCURATE_SHARE * limit
-    if wanted >= limit:
+    if wanted is not None and wanted >= limit:
         name = "with these dashpots" if packing.law.damped else "2/omega_max"
         raise SceneError(
             f"perturb.time_step = {wanted:g} is over the limit {name} = {limit:.4g} of this packing, above "
             f"which every run blows up: lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
         )
-    return wanted
+    return ACCURATE_SHARE * limit if wanted is None else wanted
 
 
 def perturb(
@@ -176,26 +174,24 @@ def perturb(
         *_, start = reach(scene, settings.fx, communicator)
     packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
-    target = None if settings.target == "top" else range(len(packing)) if settings.target == "all" else settings.target
+    target = {"top": None, "all": range(len(packing))}.get(str(settings.target), settings.target)
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
-
     part = max(SHORTEST_PART, -(-int(settings.time / dt) // MOST_PARTS))  # by the length of the run alone
-    ends = range(part, int(steps[-1]), part)
+    ends, sampled = range(part, int(steps[-1]), part), set(steps.tolist())
 
     def run() -> Iterator[Sample]:
         with Engine(packing, communicator) as engine, engine.undamped(dt, *forces) as dynamics:
-            last, sampled = 0, set(steps.tolist())
+            last = 0
             if resume is not None:
                 last = resume.step
                 dynamics.resume(last, resume.state)
-            for step in sorted(each for each in sampled | set(ends) if each > last):
+            for step in sorted(each for each in sampled.union(ends) if each > last):
                 motion, last = dynamics.advance(step - last), step
                 if step in sampled:
                     if watch is not None:
                         watch(step * dt, motion)
-                    moved = mean_square_displacement(
-                        motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
-                    )
+                    low = motion.position_low, packing.position_low
+                    moved = mean_square_displacement(motion.position, packing.position, packing.box_length, *low)
                     energy, layer = motion.kinetic_energy(packing), motion.velocity[packing.top, 0].mean()
                     yield Sample(step * dt, float(moved), energy, float(layer), motion.friction)
                 if step in ends:

@@ -62,7 +62,19 @@ def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = Non
     here = packing
     for load in loads_between(packing.fy, fy):
         report_progress(f"settled at F_y = {packing.fy:.6g}, carried to {load:.6g}")
-        here = _rest(replace(here, fy=load), communicator)
+        start = replace(here, fy=load)
+        with Engine(start, communicator) as engine:
+            try:
+                here, found = equilibrate(engine, Equilibrium.of(start), start.fx).packing, True
+            except NoEquilibriumError:
+                found = False
+            if not found and start.law.frictional:  # overdamped dynamics until forces are down at rounding
+                engine.restore(start)
+                engine.relax(finest_tolerance(start))
+                here = engine.packing
+            elif not start.law.frictional and not (found and is_minimum(here)):
+                here, found = minimize_energy(start)
+                here = here if found else settle_loose(engine, start, bed=False)
         if here.residual > FORCE_OF_MOTION * load:
             raise NoEquilibriumError(
                 f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}, at "
@@ -82,24 +94,3 @@ def loads_between(first: float, last: float) -> list[float]:
     factor = LOAD_FACTOR if last > first else 1 / LOAD_FACTOR
     whole = int(np.ceil(np.log(last / first) / np.log(factor) - 1e-9))
     return [*(first * factor**k for k in range(1, whole)), last]
-
-
-def _rest(packing: Packing, communicator: MPI.Comm | None) -> Packing:
-    """The packing at rest again after an increment of the load."""
-    with Engine(packing, communicator) as engine:
-        try:
-            found = equilibrate(engine, Equilibrium.of(packing), packing.fx).packing
-        except NoEquilibriumError:
-            found = None
-        if packing.law.frictional:
-            if found is None:  # overdamped dynamics until forces are down at rounding
-                engine.restore(packing)
-                engine.relax(finest_tolerance(packing))
-            return found or engine.packing
-    if found is not None and is_minimum(found):
-        return found
-    found, reached = minimize_energy(packing)
-    if reached:
-        return found
-    with Engine(packing, communicator) as engine:
-        return settle_loose(engine, packing, bed=False)

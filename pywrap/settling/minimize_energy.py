@@ -25,8 +25,6 @@ All of this is NumPy on the whole packing, the same on every rank. If Newton's m
 continues from there, down to a tenth of the previous force.
 """
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 
@@ -36,7 +34,7 @@ from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetri
 from ...analysis.progress import report_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import place_disks
-from ..lammps.engine import Engine
+from ..lammps.engine import MOST_STEPS_OF_DYNAMICS, Engine
 
 DYNAMICS_DISKS = 300
 """Disks up to which dynamics goes all the way: a second or two."""
@@ -96,12 +94,11 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         At rest to the rounding floor; where that is not found, to the last of the tolerances; or as it was when the
         steps ran out.
     """
+    start, width, stiffest = None if bed else loose, _width(loose), _stiffest(loose)
     if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
-        if bed:
-            engine.settle(finest_tolerance(loose))
-        else:
-            viscosity = LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose)))
-            engine.settle(finest_tolerance(loose), loose, viscosity=viscosity, steps=STAGE_STEPS)
+        viscosity = None if bed else LIGHT_VISCOSITY * float(np.sqrt(stiffest))
+        steps = MOST_STEPS_OF_DYNAMICS if bed else STAGE_STEPS
+        engine.settle(finest_tolerance(loose), start, viscosity=viscosity, steps=steps)
         packing = engine.packing
         try:
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
@@ -109,27 +106,23 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
             return packing if loose.law.frictional else minimize_energy(packing)[0]
     # damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega. Its omega is
     # pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the pressure
-    diameter, height = (
-        2 * float(loose.radius.mean()),
-        float(np.pi * np.sum(loose.radius**2) / (_width(loose) * DENSITY)),
-    )
-    carried = loose.fy * loose.top.sum() * diameter / _width(loose)
+    diameter = 2 * float(loose.radius.mean())
+    height = float(np.pi * np.sum(loose.radius**2) / (width * DENSITY))
+    carried = loose.fy * loose.top.sum() * diameter / width
     stiffness = float(loose.law.normal_stiffness(loose.law.overlap_of_force(carried)))
     viscosity = float(np.pi * SHEAR_SPEED * diameter * np.sqrt(loose.mass.mean() * stiffness) / height)
-    report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
-    start, gather = (None, height / loose.position[:, 1].max()) if bed else (loose, 1.0)
-    engine.settle(TOLERANCES[0] * loose.fy, start, gather, viscosity, STAGE_STEPS)
-    for tolerance, finer in pairwise(TOLERANCES):
+    gather = height / loose.position[:, 1].max() if bed else 1.0
+    for tolerance in TOLERANCES:
+        report_progress(f"dynamics down to {tolerance:.0e} F_y on a disk")
+        engine.settle(tolerance * loose.fy, start, gather, viscosity, STAGE_STEPS)
         packing = engine.packing
-        if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
-            return packing  # out of steps: the layer sinks
+        if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy and tolerance > TOLERANCES[-1]:
+            return packing  # out of steps: the layer sinks; rounding of forces apart
         report_progress("Newton's method")
-        packing, found = minimize_energy(packing)
+        gather, (start, found) = 1.0, minimize_energy(packing)
         if found:
-            return packing
-        report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
-        engine.settle(finer * loose.fy, packing, steps=STAGE_STEPS)
-    return minimize_energy(engine.packing)[0]
+            break
+    return start
 
 
 def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) -> tuple[Packing, bool]:
@@ -149,15 +142,14 @@ def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) ->
     bool
         Whether the force is down at the rounding floor.
     """
-    here, best, least = packing, packing, largest_force(packing)
-    sigma = max(_stiffest(packing) * min(1.0, least / packing.fy) * 1e-2, 1e-12 * _stiffest(packing))
+    here, best, least, stiffest = packing, packing, largest_force(packing), _stiffest(packing)
+    sigma = max(stiffest * min(1.0, least / packing.fy) * 1e-2, 1e-12 * stiffest)
     for _ in range(iterations):
         factors = _positive(here, sigma)
         if factors is None:
             sigma *= 10
             continue
-        step = factors.solve(here.net_force[: 2 * len(here)])
-        here, share = _downhill(here, step)
+        here, share = _downhill(here, factors.solve(here.net_force[: 2 * len(here)]))
         sigma *= 0.2 if share > 0.5 else 4.0 if share < 0.1 else 1.0
         residual = largest_force(here)
         if least < 10 * rounding_floor(best) and residual > 0.5 * least:

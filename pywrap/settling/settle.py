@@ -88,9 +88,8 @@ def settle(
     True
     """
     scene = scene_of(scene, "settle")
-    if bed is None:
-        with show_progress(watch):
-            bed = settle_bed(scene, mu, communicator)
+    with show_progress(watch):
+        bed = settle_bed(scene, mu, communicator) if bed is None else bed
     packing = _in_arithmetic(replace(bed, law=law_of(scene, mu)), scene.precision)
     with Engine(packing, communicator) as engine:
         try:
@@ -117,7 +116,10 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
                 f"fy = {scene.load.fy:g}: {CHECK_LOAD}"
             )
         return packing
-    own, settling_law, fy = settling_units(scene, law)
+    kn, fy, at = law.kn, scene.load.fy, section.settle_at
+    if at is not None:
+        kn, fy = at.kn or kn, at.fy or fy
+    own, settling_law, fy = own_units(section, replace(law, kn=kn, kt=law.kt * (kn / law.kn)), fy)
     settling_law = settling_law if own.settle_friction else replace(settling_law, mu=0.0)
     for draw in range(STARTS):  # the first of the seed's loose starts whose upper layer stays on top
         if draw:
@@ -139,7 +141,7 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
     if not own.settle_friction:
         packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
     wanted = own_units(section, law, scene.load.fy)[2]
-    if own.settle_at is not None and wanted != packing.fy:
+    if at is not None and wanted != packing.fy:
         packing = change_load(packing, wanted, communicator)
         if not packing.law.frictional:
             # those that touch nothing stay where they were put at the load of settling
@@ -147,11 +149,12 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
             packing = clear_rattlers(packing, np.intersect1d(idle_disks(packing), touching))
     # from the units of the packing to those of the scene; where disks rest does not depend on their masses
     length, radius = 2 * min(section.radii), section.start(draw).radius
-    contacts = packing.contacts.slipped(length * packing.contacts.slip)
+    contacts, position = packing.contacts.slipped(length * packing.contacts.slip), length * packing.position
     box_length = None if packing.box_length is None else section.width
-    disks = replace(packing, box_length=None, position=length * packing.position, radius=radius)
-    place = replace(disks, mass=section.mass_of(radius), box_length=box_length)
-    found = replace(place, contacts=contacts, law=law, fy=scene.load.fy)
+    found = replace(
+        packing, position=position, radius=radius, contacts=contacts, mass=section.mass_of(radius), law=law,
+        box_length=box_length, fy=scene.load.fy,
+    )  # fmt: skip
     return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
 
 
@@ -173,16 +176,6 @@ def load_of(scene: Scene) -> dict[str, Any]:
     """Load and other properties of the packings of a scene, besides disks and law."""
     drag_time = scene.damping.tau if scene.damping else None
     return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
-
-
-def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, MindlinLaw, float]:
-    """The scene under which a packing settles, in `own_units`: with its own load, or that of packing.settle_at."""
-    assert isinstance(scene.packing, GeneratedPacking)
-    kn, fy, at = law.kn, scene.load.fy, scene.packing.settle_at
-    if at is not None:
-        kn, fy = at.kn or kn, at.fy or fy
-        law = replace(law, kn=kn, kt=law.kt * (kn / law.kn))
-    return own_units(scene.packing, law, fy)
 
 
 def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:
@@ -215,8 +208,8 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     def rounded(number: float) -> float:
         return float(f"{number:.{DIGITS}g}")
 
-    sizes = {"radii": tuple(rounded(radius / length) for radius in packing.radii)}
-    section = packing.model_copy(update=sizes | {"width": rounded(packing.width / length)})
+    radii = tuple(rounded(radius / length) for radius in packing.radii)
+    section = packing.model_copy(update={"radii": radii, "width": rounded(packing.width / length)})
     tangential = Fraction(law.kt / law.kn).limit_denominator(1000)  # a share such as 2/7, to the bit
     kt = tangential.numerator * stiffness / tangential.denominator
     if not np.isclose(kt, law.kt / law.kn * stiffness, rtol=10.0**-DIGITS, atol=0.0):

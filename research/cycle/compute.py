@@ -100,7 +100,7 @@ def _compute_run(table: Path, runs: Path, seed: int, law: str, disks: int) -> No
 def numbers(path: Path, looked_at: int | None = None) -> dict[str, Any]:
     """The slips of a run, and the numbers of its chosen states by the rule; only of those before the first slips."""
     with RunFile(path) as file:
-        times, slips = file.observable("time"), slips_in(file)
+        times, slips = file.observable("time"), slips_in(file)[0]
         states = [
             where(kind, slip, float(times[frame]), float(file.fx[frame]), slips)
             | cycle_state(file.packing(frame), SPRING)

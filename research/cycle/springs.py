@@ -49,7 +49,7 @@ def row_of(seed: int, law: str, spring: float) -> dict[str, Any]:
         path = Path(folder) / "drive.h5"
         run(path, scene(seed, law, spring))
         with RunFile(path) as file:
-            times, slips = file.observable("time"), slips_in(file)
+            times, slips = file.observable("time"), slips_in(file)[0]
             states = [
                 where(kind, number, float(times[frame]), float(file.fx[frame]), slips)
                 | cycle_state(file.packing(frame), spring)

@@ -347,7 +347,7 @@ def one_contact(**change):
         ({"mass": [1 + 1j, 1]}, r"mass holds complex values"),
         ({"mass": np.ma.masked_array([1.0, 1.0], [True, False])}, r"mass holds masked values"),
         ({"ids": [7, 7]}, r"Two particles have the ID 7"),
-        ({"kind": [1]}, r"ids and kind must be lists of 2 integers"),
+        ({"kind": [1]}, r"kind must be a list of 2 integers"),
     ],
 )
 def test_values_that_no_packing_has(change, says):

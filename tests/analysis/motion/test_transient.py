@@ -18,8 +18,7 @@ def sampled(packing, norm, times):
         lower[:size, :size] = np.linalg.cholesky(0.5 * (k + k.T)).T
         lower[size:, size:] = np.diag(np.sqrt(mass))
     values = []
-    for time in times:
-        flow = expm(system * time)
+    for flow in (expm(system * time) for time in times):
         weighed = lower @ solve_triangular(lower, flow.T, trans="T").T if norm == "energy" else flow[:size, :size]
         values.append(np.linalg.norm(weighed, 2) ** 2)
     return np.array(values)

@@ -141,7 +141,7 @@ def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
         raise FaultgougeError("of this rank")
 
     with pytest.raises(FaultgougeError, match="of this rank"):
-        Ranks(0, 2, lambda mine: [mine, (None, None)]).together(raise_error)
+        Ranks(0, 2, lambda mine: [mine, None]).together(raise_error)
 
 
 @settings(max_examples=60, deadline=None)
