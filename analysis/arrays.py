@@ -1,13 +1,12 @@
 """Values of packings and other frozen data: checked, converted, copied and read-only.
 
-If the fields of a frozen dataclass differ from its arguments (arrays for lists, ones for None), the class has its own
-constructor, which converts the arguments with the functions here and passes the result to `set_frozen`.
-`derive_frozen` makes a new object from another, without repeating checks. Only these two functions set fields, and
-only of new objects.
+A frozen dataclass whose fields differ from its arguments (arrays for lists, ones for None) converts them with the
+functions here and passes the result to `set_frozen`. `derive_frozen` makes a new object from another, without repeating
+checks. Only these two functions set fields, and only of new objects.
 """
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from dataclasses import Field
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +17,13 @@ from .errors import BadInputError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Indices = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 Matrix: TypeAlias = Floats | csr_array
 """A dense or a sparse matrix."""
+
+BY_DEFAULT: Any = None
+"""What an argument is whose value follows from the others."""
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -28,18 +31,25 @@ if TYPE_CHECKING:
 Data = TypeVar("Data", bound="DataclassInstance")
 
 
-def same_bits(one: Any, other: Any) -> bool:
-    """`==` of a dataclass: whether every compared field has the same bits; -0.0 differs from 0.0."""
-    if type(one) is not type(other):
-        return NotImplemented
+class EqualToTheBit:
+    """A dataclass that is equal to another if every compared field has the same bits; -0.0 differs from 0.0."""
 
-    def bits(value: Any) -> Any:
-        if issparse(value):
-            return value.shape, *(each.tobytes() for each in (value.indptr, value.indices, value.data))
-        return (value.shape, value.dtype, value.tobytes()) if isinstance(value, np.ndarray) else value
+    __dataclass_fields__: ClassVar[dict[str, "Field[Any]"]]
 
-    names = (field.name for field in one.__dataclass_fields__.values() if field.compare)
-    return all(bits(getattr(one, name)) == bits(getattr(other, name)) for name in names)
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+
+        def bits(value: Any) -> Any:
+            if issparse(value):
+                return value.shape, *(each.tobytes() for each in (value.indptr, value.indices, value.data))
+            return (value.shape, value.dtype, value.tobytes()) if isinstance(value, np.ndarray) else value
+
+        names = (field.name for field in self.__dataclass_fields__.values() if field.compare)
+        return all(bits(getattr(self, name)) == bits(getattr(other, name)) for name in names)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
 
 
 def frozen(array: NDArray) -> NDArray:
@@ -60,11 +70,14 @@ def derive_frozen(data: Data, **changes: object) -> Data:
     Newton's method makes a packing every millisecond, of disks that stay what they are.
     """
     made = object.__new__(type(data))
-    for name in data.__dataclass_fields__:
-        if name not in changes:
-            object.__setattr__(made, name, getattr(data, name))
-    set_frozen(made, **changes)
+    set_frozen(made, **{name: getattr(data, name) for name in data.__dataclass_fields__} | changes)
     return made
+
+
+def ratio(part: Floats, whole: Floats) -> Floats:
+    """part / whole, zero where the whole is not positive; of the shape of the part."""
+    zeros = np.zeros(np.shape(part), np.result_type(part, whole))
+    return np.divide(part, whole, out=zeros, where=whole > 0)
 
 
 def number(name: str, value: float, *, positive: bool = False) -> float:
@@ -75,45 +88,38 @@ def number(name: str, value: float, *, positive: bool = False) -> float:
     return found
 
 
+def floats(name: str, value: ArrayLike, shape: tuple[int, ...], *, infinite: bool = False) -> Floats:
+    """A copy as doubles; ValueError if the shape differs, or a value is not real and finite, or infinite if allowed."""
+    if np.iscomplexobj(value) or np.ma.is_masked(value):
+        raise ValueError(f"{name} holds {'complex' if np.iscomplexobj(value) else 'masked'} values; give real numbers.")
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}; {shape} is needed.")
+    if not np.all(np.isfinite(array) | (infinite & (array == np.inf))):
+        raise ValueError(f"{name} holds a value that is not finite.")
+    return array
+
+
 SMALLEST, LARGEST = 1e-100, 1e100
 """Between these a number of a disk may be: products of three stay finite, and LAMMPS reads no subnormal ones."""
 
 
-def positive_each(name: str, array: Floats) -> Floats:
-    """The array; ValueError if the value of a disk is not positive, or is tiny or huge."""
-    if np.any(array <= 0):
-        raise BadInputError(f"Every {name} must be positive; disk {np.argmin(array)} has another.")
-    odd = np.flatnonzero((array < SMALLEST) | (array > LARGEST))
+def positive_each(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """The same of numbers that are positive, and neither tiny nor huge."""
+    array = floats(name, value, shape)
+    odd = np.flatnonzero(~((array >= SMALLEST) & (array <= LARGEST)))
     if len(odd):
-        raise BadInputError(
-            f"The {name} of disk {odd[0]} is {array[odd[0]]:g}: give one between {SMALLEST:g} and {LARGEST:g}."
-        )
+        k, between = int(odd[0]), f"between {SMALLEST:g} and {LARGEST:g}"
+        raise BadInputError(f"The {name} of disk {k} is {array[k]:g} and must be positive: give one {between}.")
     return array
 
 
-def booleans(name: str, value: ArrayLike, count: int) -> NDArray[np.bool_]:
-    """A copy as booleans, one for each disk; ValueError if there are not `count` booleans."""
+def exactly(name: str, value: ArrayLike, count: int, kind: type[np.bool_] | type[np.integer]) -> NDArray:
+    """A copy of so many booleans or integers; ValueError if they are others."""
     array = np.array(value)
-    if array.shape != (count,) or array.dtype != np.bool_:
-        raise ValueError(f"{name} must be {count} booleans, one for each disk.")
-    return array
-
-
-def real(name: str, value: ArrayLike) -> Floats:
-    """A copy as doubles; a ValueError if values are complex, or masked."""
-    if np.iscomplexobj(value) or np.ma.is_masked(value):
-        raise ValueError(f"{name} holds {'complex' if np.iscomplexobj(value) else 'masked'} values; give real numbers.")
-    return np.array(value, dtype=np.float64)
-
-
-def floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
-    """A copy as doubles; ValueError if the shape differs, or a value is not finite and real."""
-    array = real(name, value)
-    if array.shape != tuple(shape):
-        raise ValueError(f"{name} has shape {array.shape}; {tuple(shape)} is needed.")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} holds a value that is not finite.")
-    return array
+    if array.shape != (count,) or (count and not np.issubdtype(array.dtype, kind)):
+        raise ValueError(f"{name} must be a list of {count} {'booleans' if kind is np.bool_ else 'integers'}.")
+    return array.astype(np.bool_ if kind is np.bool_ else np.int64)
 
 
 def square(name: str, value: csr_array, size: int) -> csr_array:
@@ -122,16 +128,7 @@ def square(name: str, value: csr_array, size: int) -> csr_array:
     matrix.sum_duplicates()
     if matrix.shape != (size, size):
         raise ValueError(f"{name} has shape {matrix.shape}; {(size, size)} is needed.")
-    if not np.isfinite(matrix.data).all():
-        raise ValueError(f"{name} holds a value that is not finite.")
+    floats(name, matrix.data, matrix.data.shape)
     for each in (matrix.data, matrix.indices, matrix.indptr):
         frozen(each)
     return matrix
-
-
-def integers(name: str, value: ArrayLike) -> Indices:
-    """A copy as an array of integers; ValueError if the values are no integers."""
-    array = np.array(value)
-    if array.ndim != 1 or not (array.size == 0 or np.issubdtype(array.dtype, np.integer)):
-        raise ValueError(f"The contact array {name} must be a list of integers.")
-    return array.astype(np.int64)

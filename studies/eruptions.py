@@ -24,7 +24,7 @@ squared. The noise floor is the largest D of the first time unit, before any gro
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from mpi4py import MPI
@@ -32,7 +32,6 @@ from pydantic import Field
 from threadpoolctl import threadpool_limits
 
 from ..analysis import NoEquilibriumError, Packing, mean_square_displacement, nearest_image, spectrum
-from ..analysis.arrays import Floats
 from ..analysis.counted import counted
 from ..analysis.responses.growth import NOISE_FACTOR, unstable_rates
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
@@ -66,13 +65,10 @@ END_OF_GROWTH = 0.1
 WORK_STEPS = 2000
 """Steps over which work is added up: some thirty periods of the fastest mode."""
 
-RISE_OF_D = 1e4
-"""Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
-by a few hundred times in `QUIET_TIME`."""
-
-WALK_FACTOR = 10.0
-"""Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
-drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
+RISE_OF_D, WALK_FACTOR = 1e4, 10.0
+"""D of a linearly stable packing has risen beyond so many times the D of the first time unit, since rounding alone
+drifts by a few hundred times in `QUIET_TIME`; and beyond so many times the D of a random walk, one rounding of a
+coordinate a time step: strong drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
 
 AMOUNTS, COUNTS = ("time", "msd", "slip", "kinetic_energy"), ("lost", "gained", "sliding")
 """What is sampled, and what of it are numbers of contacts."""
@@ -105,22 +101,9 @@ class Eruptions(Section):
     time: Annotated[Positive, TIME] = 3000.0
 
 
-class StartOfRun(NamedTuple):
-    """Where a run begins, and how long it may take.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium.
-    residual : float
-        Its largest force on a disk: contacts that carry less do not count.
-    time : float
-        Length of the run at the most, time.
-    """
-
-    packing: Packing
-    residual: float
-    time: float
+StartOfRun = tuple[Packing, float, float]
+"""Where a run begins: the equilibrium, its largest force on a disk (contacts that carry less do not count), and the
+length of the run at the most, time."""
 
 
 def growth_rate(packing: Packing) -> float:
@@ -144,35 +127,38 @@ def erupt(start: StartOfRun) -> Row:
         `ENDS`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger
         of the two and of the kinetic energy; series : the samples as columns.
     """
-    packing = start.packing
-    carrying = packing.loaded(start.residual)
+    packing, residual, longest = start
+    carrying, contacts, box = packing.loaded(residual), contact_pairs(packing), packing.box_length
     initial, slid = contact_pairs(carrying), contact_pairs(carrying, carrying.sliding)
     with threadpool_limits(1):
         rate, dt, unit = growth_rate(packing), time_step(packing), unit_of_time(packing)
-        last = int(start.time / dt)
+        last = int(longest / dt)
         # close together at first and farther apart later, no two at one step
-        early = np.geomspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64)
-        steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64))
+        spaced = (space(min(100, last), last, SAMPLES_OF_RUN) for space in (np.geomspace, np.linspace))
         samples: list[tuple[float, ...]] = []
         moved, position, done = np.zeros_like(packing.position), packing.position, 0
         over = flows = False
         with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
-            for at in steps.tolist():
+            for at in np.union1d(*(steps.astype(np.int64) for steps in spaced)).tolist():
                 motion, done = dynamics.advance(at - done), at
                 step = motion.position - position
-                step[:, 0] = nearest_image(step[:, 0], packing.box_length)
+                step[:, 0] = nearest_image(step[:, 0], box)
                 moved, position, now = moved + step, motion.position, engine.packing
                 # from step to step, disks move less than half a box; for small D, the difference has more digits
                 msd = np.mean(np.sum(moved**2, axis=1))
-                if abs(moved).max() < 0.25 * (packing.box_length or np.inf):
+                if abs(moved).max() < 0.25 * (box or np.inf):
                     low = motion.position_low, packing.position_low
-                    msd = mean_square_displacement(motion.position, packing.position, packing.box_length, *low)
+                    msd = mean_square_displacement(motion.position, packing.position, box, *low)
                 there, sliding = contact_pairs(now), contact_pairs(now, now.sliding) - slid
                 slip = float(moved[packing.top, 0].mean())
-                counts = len(initial - there), len(there - contact_pairs(packing)), len(sliding & initial)
+                counts = len(initial - there), len(there - contacts), len(sliding & initial)
                 samples.append((at * dt, float(msd), slip, motion.kinetic_energy(packing), *counts))
-                times, sizes, *_ = np.transpose(samples)
-                over, flows = _is_over(times, sizes, rate, unit), abs(slip) > 2 * packing.radius.max()
+                time, msds, *_ = np.transpose(samples)
+                flows, over = abs(slip) > 2 * packing.radius.max(), time[-1] >= QUIET_TIME * unit
+                if rate > 0:
+                    quarter = msds[(time[-1] / 4 < time) & (time <= time[-1] / 2)].max(initial=0.0)
+                    over = msds[time > time[-1] / 2].max() <= LATE_GROWTH_OF_D * quarter
+                    over &= time[-1] >= DECADES_OF_D * np.log(10) / rate
                 if over or flows:
                     break
             before = dynamics.advance(0).kinetic_energy(packing)
@@ -180,15 +166,14 @@ def erupt(start: StartOfRun) -> Row:
             after = ended_motion.kinetic_energy(packing)
     columns = dict(zip((*AMOUNTS, *COUNTS), np.transpose(samples), strict=True))
     series = {name: column.astype(int if name in COUNTS else float).tolist() for name, column in columns.items()}
-    time, msds = columns["time"], columns["msd"]
     noise, ended = float(msds[time <= unit].max(initial=float(msds[0]))), None
     walk = WALK_FACTOR * packing.coordinate_rounding**2 * time[-1] / dt
     ends = "stable" if msds.max() <= max(RISE_OF_D * noise, walk) else "rises"
     if rate > 0:
         place = int(np.argmax(msds >= END_OF_GROWTH * msds.max()))
         opened, slides = (columns[name][: place + 1].any() for name in ("lost", "sliding"))
-        ended, ends = float(time[place]), "opens" if opened else "slides" if slides else "law"
-        ends = ends if over else "cut off"
+        ended = float(time[place])
+        ends = "cut off" if not over else "opens" if opened else "slides" if slides else "law"
     return {
         **{"fx": packing.fx, "damped": packing.damped, "rate": rate, "time": float(time[-1])},
         **{name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")},
@@ -198,23 +183,12 @@ def erupt(start: StartOfRun) -> Row:
     }
 
 
-def _is_over(time: Floats, msd: Floats, rate: float, unit: float) -> bool:
-    """Whether a run is over, see the module."""
-    now = time[-1]
-    if rate == 0:
-        return bool(now >= QUIET_TIME * unit)
-    quarter = msd[(now / 4 < time) & (time <= now / 2)].max(initial=0.0)
-    half = msd[time > now / 2].max()
-    return bool(now >= DECADES_OF_D * np.log(10) / rate and half <= LATE_GROWTH_OF_D * quarter)
-
-
 def _section(scene: Scene) -> Eruptions:
     """The section of a scene whose ramp reaches its loads."""
     until, settings = require_section(scene.ramp, "ramp").first, section_of(scene, Eruptions)
     if settings is None:
         raise SceneError("the scene has no section [eruptions]: add it, with load, a list of F_x")
-    last = max(settings.load)
-    if last > until:
+    if (last := max(settings.load)) > until:
         raise SceneError(f"eruptions.load goes to {last:g}, and ramp.until = {until:g}: ramp further")
     return settings
 
@@ -227,14 +201,11 @@ def _starts(scene: Scene, rest: Equilibrium, wanted: list[float], time: float) -
             try:
                 for load in steps[(steps > path.equilibria[-1].fx) & (steps < fx)]:
                     path(float(load))
-                packing = path(fx)
+                packing, residual = path(fx), path.equilibria[-1].residual
             except NoEquilibriumError:
                 return starts, path.equilibria[-1].fx
-            residual = path.equilibria[-1].residual
             free = replace(packing, law=replace(packing.law, cn=0.0, ct=0.0), drag_time=None)
-            starts.append(StartOfRun(free, residual, time))
-            if scene.damping is not None:
-                starts.append(StartOfRun(packing, residual, time))
+            starts += [(each, residual, time) for each in (free, packing)[: 1 + (scene.damping is not None)]]
     return starts, None
 
 
@@ -298,23 +269,18 @@ def _figures(result: Result, rows: Rows) -> Figures:
 
 
 def _page(result: Result) -> Result:
-    runs = result["runs"]
-    free, damped = ([run for run in runs if run["damped"] is kind] for kind in (False, True))
-    beside = {run["fx"]: run for run in damped}
-    damping = result["scene"].get("damping") or {}
+    runs, damping = result["runs"], result["scene"].get("damping") or {}
+    free, beside = [run for run in runs if not run["damped"]], {run["fx"]: run for run in runs if run["damped"]}
     unstable = [run for run in runs if run["ends"] != "stable"]
     noisy = [run for run in unstable if run["msd"] <= NOISE_FACTOR * run["noise"]]
     grown = [run["msd"] for run in free if run in unstable and run not in noisy]
     return {
         "runs": runs,
-        "fy": result["scene"]["load"]["fy"],
         "words": {ends: words for ends, (words, _) in ENDS.items()},
         "beside": [(run, beside[run["fx"]]) for run in free if run["fx"] in beside],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
         "small": len(noisy),
-        "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
-        "balance": max(run["balance"] for run in free),
         "criterion": (LATE_GROWTH_OF_D, DECADES_OF_D, QUIET_TIME),
     }
 
@@ -337,23 +303,22 @@ def eruptions(scene: Scene, work: Work) -> Result:
 
     With several ranks, one rank distributes the loads.
     """
-    settings, rows = _section(scene), work.rows
-    wanted, time, flows_beyond = sorted(settings.load), settings.time, None
+    settings, rows, flows_beyond = _section(scene), work.rows, None
     kinds = (False,) if scene.damping is None else (False, True)
 
     def known(fx: float, damped: bool) -> bool:
-        return rows.find(fx=fx, longest=time, damped=damped) is not None
+        return rows.find(fx=fx, longest=settings.time, damped=damped) is not None
 
-    missing = [fx for fx in wanted if not all(known(fx, damped) for damped in kinds)]
+    missing = [fx for fx in settings.load if not all(known(fx, damped) for damped in kinds)]
     if missing:
         # through the known loads as well, so that the path, and with it the last digits, is that of one run
-        loads = [fx for fx in wanted if fx <= missing[-1]]
-        starts, flows_beyond = _starts(scene, work.start(scene.law.mus[0]), loads, time)
+        loads = sorted(fx for fx in settings.load if fx <= max(missing))
+        starts, flows_beyond = _starts(scene, work.start(scene.law.mus[0]), loads, settings.time)
         if flows_beyond is not None:
             work.say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
-        starts = [each for each in starts if not known(each.packing.fx, each.packing.damped)]
+        starts = [each for each in starts if not known(each[0].fx, each[0].damped)]
         for found in work.progress(work.map_rows(erupt, starts), len(starts)):
-            rows.append(longest=time, **found)
+            rows.append(longest=settings.time, **found)
             work.say(
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
                 f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"

@@ -92,6 +92,9 @@ LABELS = {
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
 """Of modes.csv."""
 
+SHOWN = {"fx_over_fy": "g", "pairs": "d", "share": ".3f", "growth_rate": ".4g", "least_q": ".4g"}
+"""Numbers of a load that a terminal shows, and their formats."""
+
 MediansOverLoad = Mapping[str, Any]
 """loads, and for each quantity a list of [median, low, high]."""
 
@@ -111,17 +114,8 @@ class ModesSection(Section):
 
 
 class PairCounts(NamedTuple):
-    """The complex pairs of one packing.
-
-    Attributes
-    ----------
-    omega : ndarray of complex, shape (P,)
-        Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
-    modes : int
-        Number of eigenvalues.
-    negative : tuple of float
-        The real negative eigenvalues, the most negative first, 1 / time^2.
-    """
+    """The complex pairs of one packing: of each the frequency with positive real and imaginary part, fastest growing
+    first, 1 / time; the number of eigenvalues; and the real negative ones, the most negative first, 1 / time^2."""
 
     omega: Complexes
     modes: int
@@ -144,23 +138,15 @@ class PairCounts(NamedTuple):
 
 
 def count_pairs(packing: Packing) -> PairCounts:
-    """The complex pairs of a packing that exceed their rounding uncertainty.
-
-    Parameters
-    ----------
-    packing : Packing
-        In equilibrium.
-    """
+    """The complex pairs of a packing in equilibrium that exceed their rounding uncertainty."""
     if packing.coordinates > SLICED:
         found = spectrum(packing)
         omega = np.sqrt([pair.eigenvalue for pair in found.pairs]).astype(np.complex128)
         return PairCounts(omega, len(found.eigenvalues), tuple(found.negative.tolist()))
-    values = eigenvalues(packing)
+    values = eigenvalues(packing).copy()
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
-    doubtful = np.flatnonzero((values.imag > 0) & (values.imag <= surely))
-    values = values.copy()
-    for k in doubtful:  # the vectors decide
+    for k in np.flatnonzero((values.imag > 0) & (values.imag <= surely)):  # the vectors decide
         near = nearest_modes(packing, values[k] * (1 + SHIFT_OFFSET), 2)
         nearest = int(np.argmin(np.abs(near.values - values[k])))
         if not exceeds_rounding(values[k], float(near.overlap[nearest]), rounding):
@@ -180,20 +166,11 @@ def antisymmetric_norm(packing: Packing) -> float:
 
 
 def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
-    """The row of the packing at each load of [modes] that it bears.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a section [ramp].
-    rest : Equilibrium
-        The settled packing.
-    look : callable
-        Packing -> the numbers of one load.
-    """
+    """The row of a scene: `look`, packing -> the numbers of one load, at each load of [modes] that the packing bears,
+    from the settled packing on."""
     wanted = sorted((section_of(scene, ModesSection) or ModesSection()).fx_over_fy)
-    row: dict[str, Any] = {"ends": "until", "loads": []}
     step = require_section(scene.ramp, "ramp").step
+    row: dict[str, Any] = {"ends": "until", "loads": []}
     with path_from(rest, scene) as path:
         for share in wanted:
             fx = share * scene.load.fy
@@ -233,8 +210,9 @@ def load_row(packing: Packing) -> dict[str, Any]:
 
 def medians_over_load(rows: Sequence[Row], names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
     """Medians with intervals at each load, and how many packings, a row each, bear it; least Q is inf of none."""
-    loads = sorted({load["fx_over_fy"] for row in rows for load in row.get("loads", ())})
-    borne = [[load for row in rows for load in row.get("loads", ()) if load["fx_over_fy"] == each] for each in loads]
+    every = [load for row in rows for load in row.get("loads", ())]
+    loads = sorted({load["fx_over_fy"] for load in every})
+    borne = [[load for load in every if load["fx_over_fy"] == each] for each in loads]
     found: dict[str, Any] = {"packings": len(rows), "loads": loads, "count": [len(each) for each in borne]}
     for name in names:
         found[name] = [median([np.inf if load[name] is None else load[name] for load in each]) for each in borne]
@@ -242,33 +220,24 @@ def medians_over_load(rows: Sequence[Row], names: Sequence[str] = QUANTITIES) ->
 
 
 def over_load(courses: Mapping[str, MediansOverLoad], names: Sequence[str] = QUANTITIES) -> Figure:
-    """Medians with their intervals over F_x/F_y, a panel for each quantity.
-
-    Parameters
-    ----------
-    courses : mapping
-        What is written beside a line -> its numbers.
-    names : sequence of str
-        The quantities.
-    """
+    """Medians with their intervals over F_x/F_y, a panel for each quantity; what is written beside a line -> its
+    numbers."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
     from ..figures.style import INK
 
     figure = Figure((3.6 * len(names), 3.4), layout="constrained")
+    seen = sorted({load for course in courses.values() for load in course["loads"]})
+    ticks = [load for load in TICKS if load in seen]
     for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names, strict=True):
         for number, (label, course) in enumerate(courses.items()):
             draw_band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
-        seen = {load for course in courses.values() for load in course["loads"]}
-        axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
+        axes.set_xticks(ticks, [f"{load:g}" for load in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
-        found = np.concatenate([np.ravel(np.array(course[name], dtype=float)) for course in courses.values()])
-        if not np.any(np.isfinite(found) & (found > 0)):
-            axes.text(0.5, 0.5, "no motion grows", transform=axes.transAxes, ha="center", color=INK)
-            axes.set_xlim(0.5 * min(seen), 2 * max(seen))
-        elif name in ("growth_rate", "least_q"):
+        axes.set_xlim(0.8 * seen[0], 1.25 * seen[-1])  # also where no motion grows, and nothing is drawn
+        if name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
             axes.axhspan(*ROCK, color="0.9", zorder=0)
@@ -289,7 +258,8 @@ def draw_band(axes: Axes, loads: Sequence[float], values: Any, colour: str, labe
 def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
     """modes.json, modes.csv and a picture in the folder of a sweep; the loads of the first packing in words."""
     scenes = {point.key: point.scene for point in sweep.points}
-    good, lines, packings = [row for row in rows if row["says"] is None], list[Row](), list[Row]()
+    good, failed = ([row for row in rows if (row["says"] is None) is kind] for kind in (True, False))
+    lines, packings, says = list[Row](), list[Row](), list[str]()
     for row in rows:
         scene, result = scenes[row["key"]], row["result"]
         packing = {} if scene is None else scene.packing.model_dump()
@@ -299,21 +269,17 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
         packings.append({"values": row["values"], "says": row["says"]} | ends)
     write_json(output / "modes.json", {"asked": sweep.as_dict(), "rows": lines, "packings": packings})
     write_csv(output / "modes.csv", COLUMNS, lines)
-    says = []
     if lines:
-        sizes = dict.fromkeys(row["values"].get("packing.disks") for row in good)
-        groups = {str(n): [row["result"] for row in good if row["values"].get("packing.disks") == n] for n in sizes}
+        groups: dict[str, list[Row]] = {}
+        for row in good:
+            groups.setdefault(str(row["values"].get("packing.disks")), []).append(row["result"])
         courses = {name: medians_over_load(group) for name, group in groups.items()}
         draw_all({"modes": lambda: over_load(courses)}, output, say)
-        formats = {"fx_over_fy": "g", "pairs": "d", "share": ".3f", "growth_rate": ".4g", "least_q": ".4g"}
-        first = lines[: len(good[0]["result"]["loads"])]
-        table = [
-            ["" if line[k] is None else format(line[k], digits) for k, digits in formats.items()] for line in first
-        ]
+        first = good[0]["result"]["loads"]
+        table = [["" if load[k] is None else format(load[k], digits) for k, digits in SHOWN.items()] for load in first]
         says.append(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), table))
-    failed = [row["says"] for row in rows if row["says"] is not None]
     says.append(f"packings: {len(packings)}, failed: {len(failed)}; written: {output}/modes.json")
-    says += [f"the first that failed: {sentence}" for sentence in failed[:1]]
+    says += [f"the first that failed: {row['says']}" for row in failed[:1]]
     if short := [row["result"] for row in good if row["result"]["ends"] != "until"]:
         why = "an eigenvalue is negative" if short[0]["ends"] == "turning point" else "there is no equilibrium"
         says.append(

@@ -25,7 +25,6 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, find_onset
-from ..analysis.arrays import Floats, Indices
 from ..analysis.motion.buckling import nearest_modes
 from ..analysis.windows import force_bearing, takes_all_modes
 from ..pywrap import Scene, SceneError
@@ -65,7 +64,7 @@ def onset(scene: Scene, start: Start) -> Row:
             seen, window = found.windows[0], with_path_error(found, path).windows[0]
             row |= {"fx_c": window.fx_onset, "error": window.error, "error_of_path": window.path_error}
             row |= {"kind": window.kind, "lambda": window.eigenvalue}
-            row |= {"fx_end": window.fx_end, "overlap": window.onset.overlap, "doubtful": len(found.doubtful)}
+            row |= {"fx_end": window.fx_end, "doubtful": len(found.doubtful)}
             row |= pair(path(seen.fx_onset * (1 - DISTANCE_BELOW)), rest.packing, window.eigenvalue)
     return row
 
@@ -84,7 +83,8 @@ def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[str, float,
 def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
     """The pair of modes that meets next to an eigenvalue, 1 / time^2, and the contacts of a packing.
 
-    The packing is just below the onset, and `rest` the one at F_x = 0.
+    The packing is just below the onset, and `rest` the one at F_x = 0. Where all modes are computed: the rank of the
+    pair, and the modes of the packing at F_x = 0 that it has come from.
     """
     near = nearest_modes(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
@@ -100,31 +100,19 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
         "opened": len(before - now),
         "closed": len(now - before),
     }
-    if takes_all_modes(packing):
-        row |= _among_all(packing, rest, eigenvalue, near.right.real)
-    return row
-
-
-def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats) -> dict[str, Any]:
-    """Rank of the pair, and the modes of the packing at F_x = 0 that it has come from."""
-    values = np.sort(eigvals(_dense(packing)[0]).real)
+    if not takes_all_modes(packing):
+        return row
+    (loaded, _), (unloaded, active) = (dynamical_matrix(force_bearing(each)) for each in (packing, rest))
+    values, dense = np.sort(eigvals(loaded.toarray()).real), unloaded.toarray()
     rank = int(np.count_nonzero(values < eigenvalue * (1 - 1e-6)))
-    near = values[max(0, rank - 5) : rank + 7]
-    dense, active = _dense(rest)
-    modes = eigh(0.5 * (dense + dense.T))[1]
-    weight = np.sum((modes.T @ np.linalg.qr(plane[active])[0]) ** 2, axis=1)
-    first, second = np.sort(np.argsort(weight)[-2:])
-    return {
+    around = values[max(0, rank - 5) : rank + 7]
+    share = np.sum((eigh(0.5 * (dense + dense.T))[1].T @ np.linalg.qr(near.right.real[active])[0]) ** 2, axis=1)
+    ancestors = np.sort(np.argsort(share)[-2:])
+    return row | {
         "modes": len(values),
         "rank": rank,
-        "spacing": float((near[-1] - near[0]) / (len(near) - 1)),
+        "spacing": float((around[-1] - around[0]) / (len(around) - 1)),
         "largest": float(values[-1]),
-        "ancestors": [int(first), int(second)],
-        "ancestry": float(0.5 * weight[[first, second]].sum()),
+        "ancestors": ancestors.tolist(),
+        "ancestry": float(0.5 * share[ancestors].sum()),
     }
-
-
-def _dense(packing: Packing) -> tuple[Floats, Indices]:
-    """A of the coordinates with stiffness, 1 / time^2, and their numbers."""
-    matrix, active = dynamical_matrix(force_bearing(packing))
-    return matrix.toarray(), active

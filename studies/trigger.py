@@ -18,10 +18,9 @@ The user gives v_0. The paper uses the largest velocity of the unperturbed run, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import groupby
 from math import sqrt
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -31,7 +30,7 @@ from threadpoolctl import threadpool_limits
 from ..analysis import Packing, find_onset, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.responses.response import floor_force, impulse_response, layer_force
-from ..pywrap import Engine, Equilibrium, Scene, SceneError
+from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
@@ -49,17 +48,13 @@ if TYPE_CHECKING:
 DEFAULT_FREQUENCIES = 24
 """Frequencies of a map whose scene names none."""
 
-FIRST_BRACKET = 0.05
-"""Relative distance from the prediction at which the bisection begins."""
+FIRST_BRACKET, BRACKET_FACTOR = 0.05, 1.5
+"""Relative distance from the prediction at which the bisection begins, and the factor by which a bracket that does not
+hold is widened on the wrong side."""
 
-BRACKET_FACTOR = 1.5
-"""Factor by which a bracket that does not hold is widened on the wrong side."""
-
-BISECTION_RUNS = 24
-"""Runs of a bisection at the most: brackets over six decades."""
-
-BISECTION_WIDTH = 1e-2
-"""Relative width at which the bisection ends: its middle is then within half a percent."""
+BISECTION_RUNS, BISECTION_WIDTH = 24, 1e-2
+"""Runs of a bisection at the most, for brackets over six decades; and the relative width at which it ends: its middle
+is then within half a percent."""
 
 Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 
@@ -89,12 +84,8 @@ class Trigger(Section):
     on: Literal["layer", "floor"] = "layer"
 
 
-class Wave(NamedTuple):
-    """A wave of a scene, of any amplitude, on a packing in equilibrium, with the linear response by K."""
-
-    scene: Scene
-    packing: Packing
-    expected: Row
+Wave = tuple[Scene, Packing, Row]
+"""A wave of a scene, of any amplitude, on a packing in equilibrium, with the linear response by K."""
 
 
 def threshold(scene: Scene) -> float:
@@ -114,30 +105,12 @@ def settings(scene: Scene) -> Trigger:
     return section_of(scene, Trigger) or Trigger()
 
 
-def equilibria(scene: Scene, rest: Equilibrium, fx: Iterable[float]) -> dict[float, Packing]:
-    """The packings in equilibrium at some loads, along the ramp of the scene from the settled packing on."""
-    wanted = sorted(fx)
-    with path_from(rest, scene) as path:
-        for load in ramp_loads(scene):
-            if rest.fx < load <= wanted[-1]:
-                path(float(load))
-        return {each: path(each) for each in wanted}
-
-
 def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Row]:
-    """a_c at one distance from K, C and M.
+    """a_c at one distance from K, C and M; SceneError if the packing is unstable there.
 
-    Raises
-    ------
-    SceneError
-        If the packing is unstable there.
-
-    Returns
-    -------
-    list of dict
-        fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or an
-        acceleration of the floor; stationary : a_c without the transient, v_0/abs(H(omega)); reached : when the layer
-        is fastest, time.
+    Rows of fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or
+    an acceleration of the floor; stationary : a_c without the transient, v_0/abs(H(omega)); reached : when the layer is
+    fastest, time.
     """
     if growth_rate(packing) > 0:
         where = f"at F_x = {packing.fx:.10g}, below the onset," if packing.fx > 0 else "before any shear is added"
@@ -153,48 +126,27 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
     return [known | dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
 
 
-def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
-    """So many points of the map, spread over distances and frequencies."""
-    rows = [list(row) for _, row in groupby(predicted, key=lambda each: each["distance"])]
-    picked = []
-    for k, row in enumerate(rows):
-        count = runs // len(rows) + (k < runs % len(rows))
-        # from row to row the places move on by a part of their own distance, so that all frequencies have their turn
-        places = (np.arange(count) + (k + 0.5) / len(rows)) * len(row) / max(1, count)
-        picked += [row[place] for place in sorted({min(int(p), len(row) - 1) for p in places})]
-    return picked
-
-
 def bisect_amplitude(wave: Wave) -> Row:
     """a_c in LAMMPS, on this process alone.
 
-    Returns
-    -------
-    dict
-        fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the weakest that
-        did; runs : of the bisection; reached : when the weakest one triggered, time.
+    The row has fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the
+    weakest that did; runs : of the bisection; reached : when the weakest one triggered, time.
     """
-    predicted, omega, v0, runs = wave.expected["predicted"], wave.expected["omega"], threshold(wave.scene), 0
-    dt, given = time_step(wave.packing), settings(wave.scene)
-    steps = int(given.time / dt)
-    target = None if given.on == "layer" else range(len(wave.packing))
+    scene, packing, expected = wave
+    omega, v0, given, dt, runs = expected["omega"], threshold(scene), settings(scene), time_step(packing), 0
+    steps, target = int(given.time / dt), None if given.on == "layer" else range(len(packing))
 
     def triggers(amplitude: float) -> float | None:
         """The time at which the wave brings the layer above v_0; None if there is no such time."""
-        with (
-            Engine(wave.packing, MPI.COMM_SELF) as engine,
-            engine.undamped(dt, amplitude, omega, target) as dynamics,
-        ):
+        with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, amplitude, omega, target) as dynamics:
             dynamics.halt_above(v0)
             dynamics.advance(steps)
             return dynamics.steps * dt if dynamics.steps < steps else None
 
-    below, above, reached = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET), None
-    holds = False  # whether the wave `below` is known not to trigger
+    below, above = expected["predicted"] * (1 - FIRST_BRACKET), expected["predicted"] * (1 + FIRST_BRACKET)
+    reached, holds = None, False  # whether the wave `below` is known not to trigger
     with threadpool_limits(1):
-        while reached is None or not holds or above / below > 1 + BISECTION_WIDTH:
-            if runs == BISECTION_RUNS:
-                break
+        while runs < BISECTION_RUNS and (reached is None or not holds or above / below > 1 + BISECTION_WIDTH):
             amplitude = above if reached is None else below if not holds else sqrt(below * above)
             time, runs = triggers(amplitude), runs + 1
             if time is None:
@@ -202,20 +154,19 @@ def bisect_amplitude(wave: Wave) -> Row:
                 above = amplitude * BRACKET_FACTOR if reached is None else above
             elif reached is None:
                 reached = time
-            elif holds:
-                above, reached = amplitude, time
             else:
-                if triggers(0.0) is not None:
+                if not holds and triggers(0.0) is not None:
                     break
-                below, above, reached = amplitude / BRACKET_FACTOR, amplitude, time
+                below = below if holds else amplitude / BRACKET_FACTOR
+                above, reached = amplitude, time
     if reached is None:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {omega:g}: lower friction.v0")
     if not holds:
         raise SceneError(
-            f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {v0:g} without a wave, by rounding noise, so that "
+            f"at F_x = {packing.fx:.6g} the layer exceeds v_0 = {v0:g} without a wave, by rounding noise, so that "
             "no amplitude is critical: raise friction.v0"
         )
-    known = {key: wave.expected[key] for key in ("fx", "distance", "omega")}
+    known = {key: expected[key] for key in ("fx", "distance", "omega")}
     return known | {"below": below, "above": above, "runs": runs, "reached": reached}
 
 
@@ -244,10 +195,9 @@ def _threshold_figure(result: Result) -> Figure:
 
 
 def _page(result: Result) -> Result:
-    distances = []
-    for distance, group in groupby(result["map"], key=lambda row: row["distance"]):
-        rows = list(group)  # by frequency
-        distances.append((distance, min(rows, key=lambda row: row["predicted"]), rows[0]))
+    curves = [list(rows) for _, rows in groupby(result["map"], key=lambda row: row["distance"])]  # by frequency
+    weakest = [min(rows, key=lambda row: row["predicted"]) for rows in curves]
+    distances = [(rows[0]["distance"], least, rows[0]) for rows, least in zip(curves, weakest, strict=True)]
     return {"runs": [row for row in result["map"] if row["measured"] is not None], "distances": distances}
 
 
@@ -270,46 +220,53 @@ def trigger(scene: Scene, work: Work) -> Result:
     the velocity above which friction weakens. With several ranks, one rank
     distributes the runs.
     """
-    rows, given, rest = work.rows, settings(scene), work.start(scene.law.mus[0])
+    rows, given, rest, loads = work.rows, settings(scene), work.start(scene.law.mus[0]), ramp_loads(scene)
     first = rows.find(kind="onset")
     if first is None:
         work.say("onset")
         with path_from(rest, scene) as path:
-            damped = scene.damping is not None
-            found = with_path_error(find_onset(path, ramp_loads(scene), first=True, dissipation=damped), path)
+            found = with_path_error(find_onset(path, loads, first=True, dissipation=scene.damping is not None), path)
         first = rows.append(kind="onset", fx_c=found.fx_c, error=found.error)
-    distances = sorted(given.distance, reverse=True)
-    # of all distances: the path is that of one run of the command
-    packings = equilibria(scene, rest, [first["fx_c"] * (1 - distance) for distance in distances])
+    # of all distances, along the ramp from the settled packing on: the path is that of one run of the command
+    wanted = {distance: first["fx_c"] * (1 - distance) for distance in sorted(given.distance, reverse=True)}
+    with path_from(rest, scene) as path:
+        for load in loads[(loads > rest.fx) & (loads <= max(wanted.values()))]:
+            path(float(load))
+        packings = {distance: path(fx) for distance, fx in wanted.items()}
     omegas = np.array(sorted(given.omega or ()))
     if not len(omegas):
-        modes = np.sqrt(np.abs(spectrum(packings[min(packings)]).eigenvalues))
+        modes = np.sqrt(np.abs(spectrum(packings[max(packings)]).eigenvalues))
         slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
         omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
-    predicted = list[Row]()
-    for distance in distances:
-        known = rows.find(kind="predicted", distance=distance)
-        if known is None:
-            new = predictions(scene, packings[first["fx_c"] * (1 - distance)], distance, omegas)
-            known = rows.append(kind="predicted", distance=distance, found=new)
-        predicted += known["found"]
-        least = min(known["found"], key=lambda each: each["predicted"])
+    waves, table = list[Wave](), list[Row]()
+    for k, (distance, packing) in enumerate(packings.items()):
+        row = (
+            rows.find(kind="predicted", distance=distance)
+            or rows.append(kind="predicted", distance=distance, found=predictions(scene, packing, distance, omegas))
+        )["found"]
+        table += row
+        least = min(row, key=lambda each: each["predicted"])
         work.say(
             f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {least['predicted']:.3g}, at omega = {least['omega']:.4g}"
         )
-    wanted = spread_over_map(predicted, given.runs)
+        # the runs are spread evenly; from row to row the places move on by a part of their own distance, so that all
+        # frequencies have their turn
+        count = given.runs // len(packings) + (k < given.runs % len(packings))
+        places = (np.arange(count) + (k + 0.5) / len(packings)) * len(row) / max(1, count)
+        picked = sorted({min(int(place), len(row) - 1) for place in places})
+        waves += [(scene, packing, row[place]) for place in picked]
 
     def measured(each: Row) -> Row | None:
         return rows.find(kind="measured", fx=each["fx"], omega=each["omega"])
 
-    waves = [Wave(scene, packings[each["fx"]], each) for each in wanted if measured(each) is None]
-    for bisected in work.progress(work.map_rows(bisect_amplitude, waves), len(waves)):
+    missing = [wave for wave in waves if measured(wave[2]) is None]
+    for bisected in work.progress(work.map_rows(bisect_amplitude, missing), len(missing)):
         rows.append(kind="measured", **bisected)
         at = f"omega = {bisected['omega']:.4g} at {bisected['distance']:g}"
         work.say(f"{at}: triggers from {sqrt(bisected['below'] * bisected['above']):.4g} on in LAMMPS")
-    real, table, off = real_units(scene), list[Row](), list[float]()
-    for row in predicted:
-        run = measured(row) if row in wanted else None
+    real, off, chosen = real_units(scene), list[float](), [row for *_, row in waves]
+    for k, row in enumerate(table):
+        run = measured(row) if row in chosen else None
         row = row | {"measured": None}
         if run is not None:
             row |= {"measured": sqrt(run["below"] * run["above"]), "triggers_at": run["reached"]}
@@ -319,7 +276,7 @@ def trigger(scene: Scene, work: Work) -> Result:
             velocity = real.ground_velocity(row["predicted"], row["omega"], given.on)
             row |= {"frequency_Hz": real.frequency(row["omega"]), "ground_velocity_m_per_s": velocity}
             row |= {"strain": velocity / real.shear_wave, "stress_ratio": row["fx"] / real.fy}
-        table.append(row)
+        table[k] = row
     return {
         **{key: first[key] for key in ("fx_c", "error")},
         **{"v0": threshold(scene), "time": given.time, "on": given.on},

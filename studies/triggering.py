@@ -36,18 +36,19 @@ slowly for the length of the run; the rate is therefore stored as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
-from ..analysis import FaultgougeError, Growth, Onset, Packing, fit_growth, spectrum
+from ..analysis import FaultgougeError, Onset, Packing, fit_growth, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
 from ..analysis.responses.growth import JUMP_SHARE, LINEAR_RANGE, PowerLaw, fit_power_law
-from ..analysis.responses.normal_form import LEAST_CROSSOVER, NormalForm
+from ..analysis.responses.normal_form import NormalForm
 from ..analysis.responses.response import linear_response
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
@@ -90,19 +91,9 @@ Series = dict[str, Floats]
 
 
 class Forecast(NamedTuple):
-    """The linear motion after friction has weakened.
-
-    Attributes
-    ----------
-    jump : float
-        Largest D within the window of the jump, length^2.
-    growth : float
-        Decades from the jump to the largest D of the whole run; without bound, where a pair grows.
-    room : float
-        Decades from the jump to the D at which the motion ceases to be linear.
-    rate : float
-        Growth rate of D of the fastest motion, 1 / time; 0 if none grows.
-    """
+    """The linear motion after friction has weakened: the largest D within the window of the jump, length^2; decades
+    from the jump to the largest D of the whole run, without bound where a pair grows; decades from the jump to the D at
+    which the motion ceases to be linear; growth rate of D of the fastest motion, 1 / time, 0 if none grows."""
 
     jump: float
     growth: float
@@ -110,50 +101,13 @@ class Forecast(NamedTuple):
     rate: float
 
 
-class TriggeringOutcome(NamedTuple):
-    """The outcome of a run with mu(v).
-
-    Attributes
-    ----------
-    verdict : str
-        "does not weaken" : the layer never exceeds v_0. "too short" : the run ends before the jump is over. "jump
-        alone" : D stays within `GROWTH_FACTOR` of the larger of the jump and the one foreseen. "grows" : it goes
-        beyond both, at a rate that agrees with the spectrum's. "unexplained" : it goes beyond both, at no such rate.
-    crossing : float or None
-        When the layer first exceeds v_0, time.
-    jump : float or None
-        Largest D within the `JUMP_SHARE` of the run that follows, length^2.
-    growth : float or None
-        Decades from the jump to the largest D afterwards.
-    fitted : Growth or None
-        Of D from ten times the jump to a tenth of its largest value, where there is a decade between.
-    """
-
-    verdict: str
-    crossing: float | None = None
-    jump: float | None = None
-    growth: float | None = None
-    fitted: Growth | None = None
-
-
 class Triggering(NamedTuple):
-    """Undamped runs from one equilibrium.
+    """Undamped runs from one equilibrium, which is linearly stable.
 
-    Attributes
-    ----------
-    scene : Scene
-        With [perturb] and [friction].
-    start : Equilibrium
-        Linearly stable.
-    weakening : Weakening
-        mu(v), with v_0 the largest velocity of the unperturbed run if the scene gives none.
-    runs : dict
-        By name: unperturbed; perturbed; erupting, with mu(v) as well; control, the same at a force where the packing
-        is stable with the weakened friction, too, if one is known.
-    foreseen : Forecast
-        What linear theory says of the run with mu(v) after friction has weakened.
-    outcome : TriggeringOutcome
-        What the run with mu(v) shows.
+    `weakening` is mu(v), with v_0 the largest velocity of the unperturbed run if the scene gives none. `runs` by name:
+    unperturbed; perturbed; erupting, with mu(v) as well; control, the same at a force where the packing is stable with
+    the weakened friction, too, if one is known. `foreseen` is what linear theory says of the run with mu(v) after
+    friction has weakened, and `outcome` what this run shows, see `judge`.
     """
 
     scene: Scene
@@ -161,41 +115,26 @@ class Triggering(NamedTuple):
     weakening: Weakening
     runs: dict[str, Series]
     foreseen: Forecast
-    outcome: TriggeringOutcome
+    outcome: Row
+
+    def largest(self, *names: str) -> dict[str, float]:
+        """The largest D of runs, length^2, by name."""
+        return {name: float(self.runs[name]["msd"].max()) for name in names or self.runs}
 
 
 class Sensitivity(NamedTuple):
-    """Response of the pair that is about to coalesce, over the distance from the onset.
-
-    Attributes
-    ----------
-    distance : ndarray, shape (n,)
-        1 - F_x/F_x^c.
-    pairs : tuple of NormalForm
-        The pair at these distances.
-    fit : PowerLaw
-        Of the undamped amplitude over the distance.
-    """
+    """Response of the pair that is about to coalesce: distances 1 - F_x/F_x^c from the onset, shape (n,), the pair at
+    these distances, and the fit of the undamped amplitude over the distance."""
 
     distance: Floats
     pairs: tuple[NormalForm, ...]
     fit: PowerLaw
-
-    @property
-    def near(self) -> tuple[NormalForm, ...]:
-        """The pairs whose response damping may halve."""
-        return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
 
 
 def series_of(samples: Iterable[Sample]) -> Series:
     """The samples of a run as arrays of shape (T,)."""
     rows = [vars(sample) for sample in samples]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
-
-
-def largest(run: Series) -> float:
-    """The largest D of a run, length^2."""
-    return float(run["msd"].max())
 
 
 def follow(
@@ -206,40 +145,29 @@ def follow(
     communicator: MPI.Comm | None = None,
     store: Callable[[str, Series], None] = lambda name, series: None,
 ) -> Triggering:
-    """The runs from an equilibrium, and what the one with mu(v) shows.
+    """The runs from an equilibrium, the control from the one below, and what the run with mu(v) shows.
 
-    Parameters
-    ----------
-    scene : Scene
-        With [perturb], the perturbation and the length of the runs, and [friction], mu(v).
-    start : Equilibrium
-        Where they start.
-    below : Equilibrium or None
-        Where the control starts.
-    early : tuple of int
-        Samples at times that grow geometrically, of the perturbed runs and of the one whose friction falls: the layer
-        passes the velocities over which the friction falls early in a run, within a small share of its length.
-    store : callable
-        Called with the name and the samples of each run as it ends.
+    The scene has [perturb], the perturbation and the length of the runs, and [friction], mu(v). `early` are samples at
+    times that grow geometrically, of the perturbed runs and of the one whose friction falls: the layer passes the
+    velocities over which the friction falls early in a run, within a small share of its length. `store` is called with
+    the name and the samples of each run as it ends.
     """
     settings, friction = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction")
     runs: dict[str, Series] = {}
 
-    def run(
-        name: str, start: Equilibrium, amplitude: float, early: int = early[0], weakening: Weakening | None = None
-    ) -> Series:
+    def run(name: str, start: Equilibrium, amplitude: float, early: int, weakening: Weakening | None = None) -> Series:
         one = scene.model_copy(update={"perturb": settings.model_copy(update={"fx": start.fx, "amplitude": amplitude})})
         runs[name] = series_of(perturb(one, start, early=early, communicator=communicator, weakening=weakening))
         store(name, runs[name])
         return runs[name]
 
-    quiet = run("unperturbed", start, 0.0, early=200)  # as `perturb` calibrates v_0
+    quiet = run("unperturbed", start, 0.0, 200)  # as `perturb` calibrates v_0
     v0 = np.abs(quiet["layer_velocity"]).max() if isinstance(friction.v0, str) else friction.v0
     weakening = weakening_of(friction, float(v0))
-    run("perturbed", start, settings.amplitude)
+    run("perturbed", start, settings.amplitude, early[0])
     erupting = run("erupting", start, settings.amplitude, early[1], weakening)
     if below is not None:
-        run("control", below, settings.amplitude, weakening=weakening)
+        run("control", below, settings.amplitude, early[0], weakening)
     # the motion from the moment on at which the layer exceeds v_0; of the whole run if there is no such moment
     length = float(erupting["time"][-1])
     left = max(length - (time_of_crossing(erupting, weakening.v0) or 0.0), JUMP_SHARE * length)
@@ -253,38 +181,35 @@ def time_of_crossing(run: Series, v0: float) -> float | None:
     return float(run["time"][np.argmax(faster)]) if faster.any() else None
 
 
-def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
+def judge(run: Series, v0: float, foreseen: Forecast) -> Row:
     """Whether a run with mu(v) shows an instability, or the jump of the equilibrium alone.
 
-    Parameters
-    ----------
-    run : dict of ndarray
-        The run.
-    v0 : float
-        Velocity of the layer above which friction weakens, length / time.
-    foreseen : Forecast
-        Of linear theory with the weakened friction.
+    Friction weakens where the layer is faster than v_0, length / time; the forecast is that of the weakened friction.
+
+    Returns
+    -------
+    dict
+        verdict : "does not weaken", the layer never exceeds v_0; "too short", the run ends before the jump is over;
+        "jump alone", D stays within `GROWTH_FACTOR` of the larger of the jump and the one foreseen; "grows", it goes
+        beyond both, at a rate that agrees with the spectrum's; "unexplained", it goes beyond both, at no such rate.
+        weakens_at : when the layer first exceeds v_0, time, or None. jump : largest D within the `JUMP_SHARE` of the
+        run that follows, length^2, or None. growth_in_decades : from the jump to the largest D afterwards, or None.
+        growth_after_the_jump : the numbers of a Growth, of D from ten times the jump to a tenth of its largest value;
+        None unless there is a decade between.
     """
-    when = time_of_crossing(run, v0)
-    if when is None:
-        return TriggeringOutcome("does not weaken")
-    time, msd = run["time"], run["msd"]
-    over = when + JUMP_SHARE * time[-1]
-    if over >= time[-1]:
-        return TriggeringOutcome("too short", when)
+    time, msd, when = run["time"], run["msd"], time_of_crossing(run, v0)
+    found: Row = {"weakens_at": when, "jump": None, "growth_in_decades": None, "growth_after_the_jump": None}
+    if when is None or (over := when + JUMP_SHARE * time[-1]) >= time[-1]:
+        return found | {"verdict": "does not weaken" if when is None else "too short"}
     later = time >= when
-    jump, top = float(msd[later & (time <= over)].max()), float(msd[later].max())
-    try:
+    jump, top, verdict = float(msd[later & (time <= over)].max()), float(msd[later].max()), "unexplained"
+    found |= {"jump": jump, "growth_in_decades": float(np.log10(top / jump))}
+    with suppress(ValueError):
         fitted = fit_growth(time[later], msd[later], 10 * jump, 0.1 * top)
-    except ValueError:
-        fitted = None
-    verdict = "unexplained"
-    if top < GROWTH_FACTOR * max(jump, foreseen.jump):
-        verdict = "jump alone"
-    elif fitted is not None and foreseen.rate > 0:
-        off = abs(fitted.rate - foreseen.rate)
-        verdict = "grows" if off <= max(RATE_TOLERANCE * foreseen.rate, 3 * fitted.error) else "unexplained"
-    return TriggeringOutcome(verdict, when, jump, float(np.log10(top / jump)), fitted)
+        found["growth_after_the_jump"] = asdict(fitted)
+        if abs(fitted.rate - foreseen.rate) <= max(RATE_TOLERANCE * foreseen.rate, 3 * fitted.error):
+            verdict = "grows" if foreseen.rate > 0 else verdict
+    return found | {"verdict": "jump alone" if top < GROWTH_FACTOR * max(jump, foreseen.jump) else verdict}
 
 
 def forecast(start: Equilibrium, mu: float, time: float, window: float | None = None) -> Forecast:
@@ -306,8 +231,7 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
 def weakened_rate(packing: Packing, mu_ss: float) -> float:
     """Fastest growth rate of D with friction mu mu_ss in the same configuration, 1 / time; 0 if it is stable."""
     law = replace(packing.law, mu=mu_ss * packing.law.mu)
-    limit = law.slip_limit(packing.geometry.overlap)
-    slip = np.clip(packing.contacts.slip, -limit, limit)
+    slip = law.clamped(packing.geometry.overlap, packing.contacts.slip)
     return spectrum(replace(packing, law=law, contacts=replace(packing.contacts, slip=slip))).growth_rate()
 
 
@@ -331,34 +255,7 @@ def sensitivity(run: Onset) -> Sensitivity:
     return Sensitivity(distance, pairs, fit_power_law(distance, [pair.amplitude() for pair in pairs]))
 
 
-def frictions(scene: Scene) -> tuple[float, ...]:
-    """The scene's friction coefficients: the first one weakens, and the last one is its weakened value."""
-    if scene.friction is None:
-        return scene.law.mus
-    weak = scene.friction.mu_ss * scene.law.mus[0]
-    # 0.8 * 0.7 is not 0.56 to the last bit
-    return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
-
-
-def first_onset(scene: Scene, rest: Equilibrium) -> tuple[Row, tuple[Equilibrium, ...]]:
-    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
-
-    Returns
-    -------
-    row : dict
-        ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no equilibrium
-        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
-        onset, if there is one; error : uncertainty of the onset, or None.
-    path : tuple of Equilibrium
-    """
-    with path_from(rest, scene) as path:
-        ends, reach, found = first_window(path, scene)
-        whole = None if found is None else with_path_error(found, path)
-        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
-        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
-
-
-def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, float]) -> Row:
+def eruption(scene: Scene, path: Sequence[Equilibrium], window: tuple[float, float]) -> Row:
     """The runs in a window between two onsets, and the control; path leads up to the upper one.
 
     Returns
@@ -368,24 +265,21 @@ def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, f
         growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
         perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
         verdict, weakens_at, jump : whether D grows after its jump, when friction weakens, and the largest D shortly
-        after that (`TriggeringOutcome`); fitted_rate : of D after the jump, or None; foreseen_jump : by linear theory,
+        after that (`judge`); fitted_rate : of D after the jump, or None; foreseen_jump : by linear theory,
         length^2; perturbation_shows : whether the perturbed run differs from the unperturbed one.
     """
     middle = 0.5 * (window[0] + window[1])
     loads = middle, max(0.0, 2 * window[0] - middle)
     start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
     found = follow(scene, start, below, communicator=MPI.COMM_SELF)
-    most = {name.replace("erupting", "weakening"): largest(run) for name, run in found.runs.items()}
-    outcome = found.outcome
+    most, outcome = found.largest(), found.outcome
+    fitted = outcome["growth_after_the_jump"]
     return {
-        "fx": start.fx,
-        "fx_control": below.fx,
+        **{"fx": start.fx, "fx_control": below.fx},
         "rate": weakened_rate(start.packing, require_section(scene.friction, "friction").mu_ss),
-        **most,
-        "verdict": outcome.verdict,
-        "weakens_at": outcome.crossing,
-        "jump": outcome.jump,
-        "fitted_rate": None if outcome.fitted is None else outcome.fitted.rate,
+        **{name.replace("erupting", "weakening"): each for name, each in most.items()},
+        **{key: outcome[key] for key in ("verdict", "weakens_at", "jump")},
+        "fitted_rate": fitted and fitted["rate"],
         "foreseen_jump": found.foreseen.jump,
         "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
     }
@@ -408,32 +302,33 @@ def summary_of_rows(rows: Sequence[Row]) -> dict[str, Any]:
         control_rise_quartiles : decades, or None; unstable_when_weakened, grows, perturbation_shows : shares of the
         scenes with runs. A share is what `share` returns.
     """
-    results = [row["result"] for row in rows]
-    ramps = [end for result in results for end in result.get("ramps", ())]
-    eruptions = [found for result in results if (found := result.get("eruption"))]
+    ramps = [end for row in rows for end in row["result"].get("ramps", ())]
+    eruptions = [found for row in rows if (found := row["result"].get("eruption"))]
     several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
-    decided = [row["result"]["lowered"] for row in several if row["result"]["lowered"] is not None]
-    undecided = [row for row in several if row["result"]["lowered"] is None and row["says"] is None]
+    lowered = [
+        row["result"]["lowered"] for row in several if row["says"] is None or row["result"]["lowered"] is not None
+    ]
     numbers: dict[str, Any] = {"onsets": []}
+
+    def share_of(marks: Sequence[bool]) -> dict[str, Any]:
+        return share(sum(marks), len(marks))
+
     for mu in dict.fromkeys(end["mu"] for end in ramps):
         ends, reach = zip(*((end["ends"], end["reach"]) for end in ramps if end["mu"] == mu), strict=True)
         found = [each == "onset" for each in ends]
         flows = {"none_until": ends.count("until"), "flows": ends.count("flows")}
-        numbers["onsets"].append({"mu": mu, "found": _share(found), **flows, "quartiles": quartiles(reach, found)})
-    numbers |= {"lowered": _share(decided), "lowered_unknown": len(undecided)}
+        numbers["onsets"].append({"mu": mu, "found": share_of(found), **flows, "quartiles": quartiles(reach, found)})
+    numbers["lowered"] = share_of([each for each in lowered if each is not None])
+    numbers["lowered_unknown"] = lowered.count(None)
     for run, name in (("weakening", "rise"), ("control", "control_rise")):
         rises = [float(np.log10(each[run] / each["perturbed"])) for each in eruptions]
-        numbers[f"{name}s"] = {str(n): _share([rise >= n for rise in rises]) for n in RISES_IN_DECADES}
+        numbers[f"{name}s"] = {str(n): share_of([rise >= n for rise in rises]) for n in RISES_IN_DECADES}
         numbers[f"{name}_quartiles"] = np.quantile(rises, (0.25, 0.5, 0.75)).tolist() if rises else None
     return numbers | {
-        "unstable_when_weakened": _share([each["rate"] > 0 for each in eruptions]),
-        "grows": _share([each["verdict"] == "grows" for each in eruptions]),
-        "perturbation_shows": _share([each["perturbation_shows"] for each in eruptions]),
+        "unstable_when_weakened": share_of([each["rate"] > 0 for each in eruptions]),
+        "grows": share_of([each["verdict"] == "grows" for each in eruptions]),
+        "perturbation_shows": share_of([each["perturbation_shows"] for each in eruptions]),
     }
-
-
-def _share(marks: Sequence[bool]) -> dict[str, Any]:
-    return share(sum(marks), len(marks))
 
 
 def in_words(numbers: dict[str, Any]) -> list[str]:
@@ -458,23 +353,33 @@ def triggering(scene: Scene, start: Start) -> Row:
     Returns
     -------
     dict
-        ramps : what `first_onset` finds for each friction coefficient, the scene's first one first and what it weakens
-        to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption : what
-        `eruption` finds, None without a window between the two onsets, or without [perturb] in the scene.
+        ramps : for each friction coefficient, the scene's first one first and what it weakens to last: mu; ends :
+        "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no equilibrium beyond
+        `reach`; reach : the onset, or the largest F_x up to which there is none, force per disk of the upper layer;
+        error : uncertainty of the onset, or None. lowered : whether weakening friction lowers the onset, None if that
+        cannot be known; eruption : what `eruption` finds, None without a window between the two onsets, or without
+        [perturb] in the scene.
     """
     require_section(scene.ramp, "ramp")
     row: Row = {"ramps": [], "lowered": None, "eruption": None}
-    paths = list[tuple[Equilibrium, ...]]()
+    frictions, friction, paths = scene.law.mus, scene.friction, list[list[Equilibrium]]()
+    if friction is not None:
+        weak = friction.mu_ss * frictions[0]
+        # 0.8 * 0.7 is not 0.56 to the last bit
+        frictions = (*(mu for mu in frictions if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
     try:
-        for mu in frictions(scene):
-            end, path = first_onset(scene, start(mu))
-            row["ramps"].append({"mu": mu} | end)
-            paths.append(path)
-        strong, weak = row["ramps"][0], row["ramps"][-1]
+        for mu in frictions:
+            with path_from(start(mu), scene) as path:
+                ends, reach, found = first_window(path, scene)
+                whole = None if found is None else with_path_error(found, path)
+                paths.append(path.equilibria)
+            reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
+            row["ramps"].append({"mu": mu, "ends": ends, "reach": reach, "error": error})
+        first, last = row["ramps"][0], row["ramps"][-1]
         if len(paths) > 1:
-            row["lowered"] = sign_test(strong, weak)
-        if row["lowered"] and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
-            row["eruption"] = eruption(scene, paths[0], (weak["reach"], strong["reach"]))
+            row["lowered"] = sign_test(first, last)
+        if row["lowered"] and first["ends"] == "onset" and scene.perturb is not None and friction is not None:
+            row["eruption"] = eruption(scene, paths[0], (last["reach"], first["reach"]))
     except (FaultgougeError, ValueError) as error:  # ValueError: of LAPACK
         row["says"] = str(error)
     return row

@@ -21,8 +21,7 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array, diags_array
 
-from ..arrays import Floats
-from ..configuration import Configuration
+from ..arrays import Floats, derive_frozen, ratio
 from ..errors import BadInputError
 from ..has_configuration import HasConfiguration
 from ..operators.damping import damping_matrix
@@ -80,40 +79,39 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
         )
     if configuration.stiffness is not None:
         raise BadInputError("The law of each contact is needed, and this packing has K by differences of forces.")
-    stiff, limit, force, b = c.tangential_stiffness[:, None], c.normal_force, c.tangential_force, c.overlap_derivative()
-    share = np.divide(c.friction, c.normal_force, out=np.full(len(c), np.inf), where=c.normal_force > 0)
-    taken, powers, totals = np.zeros((3, len(c))), list[Floats](), [0.0]
-    before = np.zeros(len(c)), np.zeros((len(c), 3))
-    for k, (q, v) in enumerate(zip(moved, speed, strict=True)):
-        (overlap, slip), (growth, sliding) = _rates(configuration, q), _rates(configuration, v)
-        force = force - stiff * (slip - before[1]) + b * (overlap - before[0])[:, None]
+    whole = derive_frozen(configuration, free=np.ones(len(configuration), np.bool_))
+    u, w = whole.pair_rows(), whole.pair_rows(arms=c.slip_arm)
+
+    def rates(q: Floats) -> tuple[Floats, Floats]:
+        """Changes of the overlaps, shape (C,), and slips, (C, 3), of displacements or velocities."""
+        shift = (u @ q).reshape(-1, 3)
+        along = np.einsum("ca,ca->c", c.normal, shift)
+        return -along, ~c.couple[:, None] * (shift - along[:, None] * c.normal) + np.cross(
+            c.normal, (w @ q).reshape(-1, 3)
+        )
+
+    stiff, limit, force, b = c.tangential_stiffness, c.normal_force, c.tangential_force, c.overlap_derivative()
+    share = np.where(c.normal_force > 0, ratio(c.friction, c.normal_force), np.inf)
+    taken, power, totals = np.zeros((3, len(c))), np.zeros((2, len(c))), np.zeros(len(t))
+    before, earlier = (np.zeros(len(c)), np.zeros((len(c), 3))), power
+    for k in range(len(t)):
+        (overlap, slip), (growth, sliding) = rates(moved[k]), rates(speed[k])
+        force = force - stiff[:, None] * (slip - before[1]) + b * (overlap - before[0])[:, None]
         limit = limit + c.normal_stiffness * (overlap - before[0])
         size, bound = np.linalg.norm(force, axis=1), share * np.maximum(limit, 0.0)
-        excess = np.where(size > bound, size - np.where(np.isfinite(bound), bound, size), 0.0)
-        slid = np.divide(excess, stiff[:, 0], out=np.zeros_like(excess), where=stiff[:, 0] > 0)
-        force *= np.divide(size - excess, size, out=np.ones_like(size), where=size > 0)[:, None]
-        power = np.array([~c.couple * c.normal_dashpot * growth**2,
-                          c.tangential_dashpot * np.einsum("ca,ca->c", sliding, sliding) * (slid == 0)])  # fmt: skip
-        powers.append(power)
+        excess = np.where(size > bound, size - bound, 0.0)
+        slid = ratio(excess, stiff)
+        force *= np.where(size > 0, ratio(size - excess, size), 1.0)[:, None]
+        sticks = np.einsum("ca,ca->c", sliding, sliding) * (slid == 0)
+        power = np.array([~c.couple * c.normal_dashpot * growth**2, c.tangential_dashpot * sticks])
         if k:
-            taken[:2] += 0.5 * (t[k] - t[k - 1]) * (powers[-1] + powers[-2])
+            taken[:2] += 0.5 * (t[k] - t[k - 1]) * (power + earlier)
             taken[2] += (size - excess) * slid
-            totals.append(float(taken.sum()))
-        before = overlap, slip
+            totals[k] = taken.sum()
+        before, earlier = (overlap, slip), power
     drag = configuration.drag_rate * np.einsum("ti,i,ti->t", speed, configuration.coordinate_mass, speed)
     by_drag = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (drag[1:] + drag[:-1]))])
-    return LostEnergy(t, taken[0], taken[1], taken[2], float(by_drag[-1]), np.array(totals) + by_drag)
-
-
-def _rates(configuration: Configuration, moved: Floats) -> tuple[Floats, Floats]:
-    """Changes of the overlaps, shape (C,), and slips, (C, 3), of displacements or velocities."""
-    c = configuration.contacts
-    (shift, turn), radius = configuration.vectors(moved), configuration.radius
-    second, pair = np.where(c.wall, 0, c.j), ~c.wall[:, None]
-    rolls = pair * (c.slip_arm[:, 1] / radius[second])[:, None] * turn[second]
-    u, w = shift[c.i] - pair * shift[second], (c.slip_arm[:, 0] / radius[c.i])[:, None] * turn[c.i] + rolls
-    along = np.einsum("ca,ca->c", c.normal, u)
-    return -along, ~c.couple[:, None] * (u - along[:, None] * c.normal) + np.cross(c.normal, w)
+    return LostEnergy(t, taken[0], taken[1], taken[2], float(by_drag[-1]), totals + by_drag)
 
 
 def lost_by_modes(packing: HasConfiguration, velocity: Floats) -> tuple[Floats, Floats]:

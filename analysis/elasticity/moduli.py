@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, diags_array
 
 from ..arrays import Complexes, Floats
-from ..assembly import ContactDerivatives, as_springs, contact_derivatives
+from ..assembly import as_springs, contact_derivatives
 from ..configuration import Configuration
 from ..contacts import LinearisedContacts
 from ..counted import counted
@@ -178,13 +178,8 @@ class ElasticModuli:
 
 
 def volume_of(configuration: Configuration, volume: float | None = None) -> tuple[float, str]:
-    """The volume of a packing (area of disks), and which one is meant, in words.
-
-    Raises
-    ------
-    BadInputError
-        If nothing bounds the packing along an axis, and no volume is given.
-    """
+    """The volume of a packing (area of disks), and which one is meant, in words. A BadInputError if nothing bounds the
+    packing along an axis, and no volume is given."""
     c, d = configuration.contacts, configuration.dimension
     if volume is not None:
         return float(volume), f"volume {volume:g} as given"
@@ -291,14 +286,15 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
             "stress(packing) has the mean stress between walls."
         )
     volume, box = volume_of(configuration)
-    branch, size = configuration.branch, configuration.coordinates
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:
         parts.append((1j * frequency, as_springs(c)))
-    by_motion = [(w, each, contact_derivatives(each)) for w, each in parts]
-    force = sum(w * each.force_by_u[:, :, None] * branch.T for w, _, each in by_motion)
-    unbalanced = [w * _unbalanced(configuration, each, of_each, branch) for w, each, of_each in by_motion]
-    response, loads = QuietResponse(configuration, frequency), np.sum(unbalanced, axis=0).reshape(size, 9)
+    # u of each contact under the nine gradients, of which disks have four
+    one = np.diag(np.arange(3) < d).astype(float)
+    branch = configuration.branch @ one
+    affine_u = np.einsum("ak,cl->cakl", one, branch).reshape(-1, 3, 9)
+    loads = sum(weight * (configuration.force_rates(each)[0] @ affine_u.reshape(-1, 9)) for weight, each in parts)
+    response = QuietResponse(configuration, frequency)
     moved = response.solve(loads)
     lacks = float(np.linalg.norm(loads - response.matrix @ moved) / (np.linalg.norm(loads) or 1.0))
     if lacks > UNSOLVED:
@@ -306,23 +302,25 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
             f"The packing has no elastic moduli: under a strain {lacks:.1g} of the forces stay unbalanced, as they "
             "drive a motion without stiffness."
         )
-    moved = moved.reshape(size, 3, 3)
-    affine = -np.einsum("aklc,cb->abkl", force, branch) / volume
-    work, arms = affine.copy(), c.slip_arm / configuration.radius[np.column_stack([c.i, c.j])]
-    for k, m in np.ndindex(d, d):
-        shift, turn = configuration.vectors(moved[:, k, m])
-        u, w = shift[c.i] - shift[c.j], arms[:, :1] * turn[c.i] + arms[:, 1:] * turn[c.j]
-        for share, _, each in by_motion:
-            answer = np.einsum("abc,cb->ac", each.force_by_u, u) + np.einsum("abc,cb->ac", each.force_by_w, w)
-            work[:, :, k, m] -= share * np.einsum("ac,cb->ab", answer, branch) / volume
-    sigma, one = -stress(configuration), np.diag(np.arange(3) < d).astype(float)
+    by_motion = [(weight, contact_derivatives(each)) for weight, each in parts]
+
+    def of_stress(u: Complexes, w: Complexes) -> Complexes:
+        force = sum(weight * (each.force_by_u @ u + each.force_by_w @ w) for weight, each in by_motion)
+        return np.asarray(np.einsum("cb,can->abn", branch, force).reshape(3, 3, 3, 3) / -volume)
+
+    u, w = (
+        (rows @ moved).reshape(affine_u.shape)
+        for rows in (configuration.pair_rows(), configuration.pair_rows(arms=c.slip_arm))
+    )
+    affine, work, sigma = of_stress(affine_u, 0 * affine_u), of_stress(affine_u + u, w), -stress(configuration)
     turned = np.einsum("al,bk->abkl", sigma, one) - np.einsum("ab,kl->abkl", sigma, one)
     by_gradient, affine = work + turned, affine + turned
     bears = np.setdiff1d(np.arange(len(configuration)), configuration.rattlers)
     return ElasticModuli(
         tensor=0.5 * (by_gradient + by_gradient.swapaxes(2, 3)), affine=0.5 * (affine + affine.swapaxes(2, 3)),
-        by_gradient=by_gradient, work=work, displacement=moved, dimension=d, at_bound=int(c.one_sided.sum()),
-        volume=volume, density=float(configuration.mass[bears].sum() / volume), frequency=frequency, box=box,
+        by_gradient=by_gradient, work=work, displacement=moved.reshape(-1, 3, 3), dimension=d,
+        at_bound=int(c.one_sided.sum()), volume=volume, density=float(configuration.mass[bears].sum() / volume),
+        frequency=frequency, box=box,
     )  # fmt: skip
 
 
@@ -334,30 +332,8 @@ def _require_laws(configuration: Configuration, what: str) -> None:
         )
 
 
-def _unbalanced(configuration: Configuration, c: LinearisedContacts, d: ContactDerivatives, branch: Floats) -> Floats:
-    """b: forces (F, T/R) on the coordinates by the displacement gradient, shape (coordinates, 3, 3)."""
-    n = len(configuration)
-    total = np.zeros((6, 3, 3, n))
-    for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0))):
-        radius = configuration.radius[partner]
-        turn = -c.lever_arm[:, p] / radius * d.torque_by_u + c.lever_slope / radius * d.growth
-        both = np.concatenate([sign * d.force_by_u, turn])[:, :, None] * (branch.T * configuration.free[partner])
-        for place in np.ndindex(6, 3, 3):
-            total[place] += np.bincount(partner, both[place], n)
-    rows = [0, 1, 2, 3, 4, 5] if configuration.dimension == 3 else [0, 1, 5]
-    flat = np.arange(3) < configuration.dimension
-    total = total[rows] * flat[:, None, None] * flat[:, None]  # a gradient along z is none of disks
-    return np.asarray(total.transpose(0, 3, 1, 2).reshape(-1, 3, 3))
-
-
 class QuietResponse:
-    """Displacements under forces of one frequency; motions without stiffness are held where they are.
-
-    Parameters
-    ----------
-    frequency : float, optional
-        Radian / time; K alone without it.
-    """
+    """Displacements under forces of one frequency, or of none; motions without stiffness are held where they are."""
 
     def __init__(self, configuration: Configuration, frequency: float | None = None) -> None:
         matrix, mass = configuration.assembled_stiffness(), configuration.coordinate_mass

@@ -143,7 +143,7 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
     Parameters
     ----------
     path : Path
-        The file. A device is written to directly.
+        The file.
     head : str
         Of a format without a mark: how the files begin that may be replaced.
 
@@ -155,26 +155,22 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     part = target.with_name(f".{target.stem[:LONGEST_NAME]}.{secrets.token_hex(8)}.part{target.suffix}")
     try:
-        if target.exists() and not target.is_file():
-            yield target
-            return
         check_own(target, head)
-        with part.open("xb") as stream:  # a file of its own, or an error
-            if target.exists():
-                os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
+        part.open("xb").close()  # a file of its own, or an error
+        if target.exists():
+            part.chmod(stat.S_IMODE(target.stat().st_mode))
         yield part
         with part.open("ab") as stream:
             stream.write(TRAILERS.get(part.suffix.lower(), b""))
         _synchronise(part)
         os.replace(part, target)
         _synchronise(target.parent)
-    except BaseException as error:
-        with suppress(OSError):  # a folder that does not exist, or may not be written to, has no part
-            part.unlink(missing_ok=True)
-        if not isinstance(error, OSError):
-            raise
+    except OSError as error:
         kept = "what it held before is kept" if target.exists() else "there is no such file now"
         raise OutputError(f"{path} cannot be written: {error.strerror or error}; {kept}.") from error
+    finally:
+        with suppress(OSError):  # a folder that does not exist, or may not be written to, has no part
+            part.unlink(missing_ok=True)
 
 
 def _synchronise(path: Path) -> None:
@@ -192,10 +188,13 @@ def _synchronise(path: Path) -> None:
 def check_own(path: Path, head: str = "") -> None:
     """Refuse to replace or to remove a file that is read-only, or that this program has not written.
 
-    Raises an OutputError. `head` is how files of a format without a mark begin; an empty file is anybody's.
+    Raises an OutputError, of a folder, a pipe or a device, too. `head` is how files of a format without a mark begin;
+    an empty file is anybody's.
     """
-    if not path.is_file():
+    if not path.exists():
         return
+    if not path.is_file():
+        raise OutputError(f"{path} cannot be written: it is a folder, a pipe or a device: give the name of a file.")
     if not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):  # root may write what is read-only
         raise OutputError(f"{path} cannot be written: it is read-only; make it writeable, or give another name.")
     with path.open("rb") as stream:
@@ -244,8 +243,6 @@ def check_output(path: Path, *inputs: Path, head: str = "") -> None:
     folder = path.absolute().parent
     if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
-    if path.is_dir():
-        raise OutputError(f"{path} cannot be written: it is a folder: give the name of a file.")
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise OutputError(f"{path} cannot be written: there is no folder {folder} that may be written to.")
     check_own(path, head)
@@ -265,43 +262,36 @@ def make_folder(path: Path, *names: str) -> None:
 def lock_output(path: Path) -> Iterator[None]:
     """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
 
-    The lock is a file beside the file, or in the folder, and is removed in the end. A device has none. Raises
-    OutputError if another process has it.
+    The lock is a file beside the file, or in the folder, and is removed in the end. Raises OutputError if another
+    process has it.
     """
-    lock, held = lock_of(path), False
-    if lock is None:
-        yield
-        return
-    while not held:
-        try:
-            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
+    lock = lock_of(path)
+    try:
+        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
+    held = False
+    try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # who had it before may just have removed it from under its name
-            held = lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
-        except BlockingIOError:
-            says = "another run is writing it: wait for its end, or give another name"
-            raise OutputError(f"{path} cannot be written, since {says}.") from None
+            held = os.path.samestat(os.fstat(descriptor), lock.stat())  # or who had it before has just removed it
+        except (BlockingIOError, FileNotFoundError):
+            pass
         except OSError:  # a file system without locks
             held = True
-        finally:
-            if not held:
-                os.close(descriptor)
-    try:
+        if not held:
+            says = "another run is writing it: wait for its end, or give another name"
+            raise OutputError(f"{path} cannot be written, since {says}.")
         yield
     finally:
-        with suppress(OSError):
-            lock.unlink()
+        if held:
+            lock.unlink(missing_ok=True)
         os.close(descriptor)
 
 
-def lock_of(path: Path) -> Path | None:
-    """The lock file of a file or a folder; a device has none."""
+def lock_of(path: Path) -> Path:
+    """The lock file of a file or a folder."""
     target = Path(os.path.realpath(path))
-    if target.exists() and not (target.is_file() or target.is_dir()):
-        return None
     return target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
 
 
@@ -344,24 +334,18 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
     if header != _header(image):
         says = f"{path} is damaged: its {len(image)} bytes do not have the checksum that was written with them"
         raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     with telling(path, "is damaged, or is none of this program's files"):
         file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW if writable else 0))
-        number, strange = file.attrs.get(FORMAT_KEY), file.visititems_links(lambda *each: _not_in(file, *each))
-        if strange is None:
-            check_format(number, path)
-            return file
-        file.close()
-        raise ValueError(f"/{strange} has its numbers in another file, or more than this machine has memory")
-
-
-def _not_in(file: h5py.File, name: str, link: object) -> str | None:
-    """The name, if its numbers are in another file, or do not fit into the memory of this machine."""
-    import h5py
-
-    item = None if isinstance(link, h5py.ExternalLink) else file[name]
-    if item is not None and not isinstance(item, h5py.Dataset):
-        return None
-    if item is None or item.external or item.is_virtual:
-        return name
-    largest = max(item.nbytes, math.prod(item.chunks or ()) * item.dtype.itemsize)
-    return name if largest > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") else None
+        names = list[str]()
+        file.visit_links(names.append)
+        for name in names:
+            outside = isinstance(file.get(name, getlink=True), h5py.ExternalLink)
+            if not outside and isinstance(item := file[name], h5py.Dataset):
+                largest = max(item.nbytes, math.prod(item.chunks or ()) * item.dtype.itemsize)
+                outside = item.external or item.is_virtual or largest > memory
+            if outside:
+                file.close()
+                raise ValueError(f"/{name} has its numbers in another file, or more than this machine has memory")
+        check_format(file.attrs.get(FORMAT_KEY), path)
+        return file

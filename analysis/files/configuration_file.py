@@ -30,13 +30,10 @@ CREATOR = "faultgouge"
 CHECKSUM: dict[str, Any] = {"fletcher32": True}
 """A checksum for every chunk, for readers other than this one."""
 
-SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
-ARRAYS = (
-    "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
-    "wall_force",
-)  # fmt: skip
-MATRICES = ("stiffness", "damping", "constraint")
-MATRIX_PARTS = ("data", "indices", "indptr")
+PARTS = {"contacts": tuple(PER_CONTACT)} | dict.fromkeys(
+    ("stiffness", "damping", "constraint"), ("data", "indices", "indptr")
+)
+"""Fields of a Configuration that are groups, and the arrays in each."""
 
 
 def write_configuration(
@@ -64,16 +61,16 @@ def write_configuration(
         particles["box/edges"] = np.linalg.norm(c.box, axis=1)
         sides = ["periodic" if each else "none" for each in c.periodic]
         particles["box"].attrs.update({"dimension": 3, "boundary": sides})
-        more = {"proof": c.proof, "remarks": list(c.remarks) or None}
-        numbers = {name: getattr(c, name) for name in SCALARS} | more
-        group.attrs.update({name: value for name, value in numbers.items() if value is not None})
-        for name in ARRAYS:
-            group[name] = getattr(c, name)
-        given = {name: matrix for name in MATRICES if (matrix := getattr(c, name)) is not None}
-        parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in MATRIX_PARTS}
-        parts |= {f"contacts/{name}": getattr(c.contacts, name) for name in PER_CONTACT}
-        for name, values in parts.items():
-            group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
+        given = {name: value for name in c.__dataclass_fields__ if (value := getattr(c, name)) is not None}
+        for name, value in given.items():
+            if isinstance(value, np.ndarray):
+                group[name] = value
+            elif name not in PARTS and value != ():
+                group.attrs[name] = value
+            for part in PARTS.get(name, ()):
+                values = getattr(value, part)
+                layout = {"chunks": True, **CHECKSUM} if len(values) else {}
+                group.create_dataset(f"{name}/{part}", data=values, **layout)
         file.attrs.update(attributes or {})
         write_sealed(path, file)
 
@@ -92,17 +89,20 @@ def holds_configuration(path: Path) -> bool:
 def read_configuration(path: Path) -> Configuration:
     """The configuration of a file. Raises PackingFileError if the file is missing, damaged, or holds none."""
     with open_sealed(path) as file, telling(path, "holds no configuration that can be read"):
-        group = file["snapshot"]
+        group, known = file["snapshot"], Configuration.__dataclass_fields__.keys()
         # what version 1 did not store has a default
-        contacts = {name: group[f"contacts/{name}"][()] for name in PER_CONTACT if f"contacts/{name}" in group}
-        given = {name: group[name][()] for name in ARRAYS if name in group}
-        given |= {name: group.attrs[name].item() for name in (*SCALARS, "proof") if name in group.attrs}
-        for name in (each for each in MATRICES if each in group):
-            parts = tuple(group[f"{name}/{each}"][()] for each in MATRIX_PARTS)
-            given[name] = csr_array(parts, shape=(len(parts[2]) - 1,) * 2)
-            given[name].check_format()
-        given["remarks"] = [str(each) for each in group.attrs.get("remarks", ())]
-        return Configuration(contacts=LinearisedContacts(**contacts), **given)
+        given = {name: group.attrs[name].tolist() for name in known & group.attrs.keys()}
+        for name in known & group.keys():
+            if name not in PARTS:
+                given[name] = group[name][()]
+                continue
+            parts = {part: group[name][part][()] for part in PARTS[name] if part in group[name]}
+            if name == "contacts":
+                given[name] = LinearisedContacts(**parts)
+            else:
+                given[name] = csr_array(tuple(parts.values()), shape=(len(parts["indptr"]) - 1,) * 2)
+                given[name].check_format()
+        return Configuration(**given)
 
 
 def write_h5md(file: "h5py.File") -> None:

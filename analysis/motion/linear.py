@@ -10,10 +10,11 @@ taken out first, exactly.
 **Beyond**, a motion that grows is looked for (:mod:`~faultgouge.analysis.motion.random_state`). If none is found,
 a certificate says that no fast motion grows, and slow ones are found one by one
 (:mod:`~faultgouge.analysis.motion.certificate`). Where there is no certificate, as with dashpots that are too weak for
-the asymmetry of the law, a random state is followed until it has decayed. Without
-dissipation only a symmetric K, or all its eigenvalues (:mod:`~faultgouge.analysis.motion.spectrum`), say that nothing
-grows. Groups of particles that touch none of another group have a verdict each: many spheres that lie on a plane by
-themselves have the same eigenvalues, of which a block of vectors sees a few.
+the asymmetry of the law, the slowest motions are found one by one (:mod:`~faultgouge.analysis.motion.slow_motions`),
+and a random state without these is followed until it has decayed. Without dissipation only a symmetric K, or all its
+eigenvalues (:mod:`~faultgouge.analysis.motion.spectrum`), say that nothing grows. Groups of particles that touch none
+of another group have a verdict each: many spheres that lie on a plane by themselves have the same eigenvalues, of which
+a block of vectors sees a few.
 """
 
 from dataclasses import replace

@@ -33,6 +33,9 @@ one after the other, span its plane nearly, and Newton's steps find its eigenval
 
 If the state grows faster than that, s is a lower bound: another of many motions that grow alike is faster.
 
+**Slow motions** are known one by one (:mod:`~faultgouge.analysis.motion.slow_motions`), and are taken out of the state:
+the others alone have to decay in its time. Their l, and so the argument, stay as they are.
+
 Motion of one particle that no force opposes is left out, and common motion of all particles along an axis on which no
 force opposes it, as in a periodic box. Any other motion that no force opposes leaves the answer open.
 
@@ -40,6 +43,7 @@ force opposes it, as in a periodic box. Any other motion that no force opposes l
 nor decays in these steps; motion that grows in spite of dashpots grows faster in longer steps, which s does not.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -50,8 +54,9 @@ from ..arrays import Complexes, Floats
 from ..errors import BadInputError
 from ..factors.sparse_lu import SingularMatrixError, general_lu, negative_pivots
 from ..progress import report_progress
-from .eigenvalues import Linear
+from .eigenvalues import Linear, exponential
 from .motion import Motion
+from .slow_motions import slow_motions
 from .stable_timestep import stable_timestep
 
 CHANCE = 1e-3
@@ -79,6 +84,7 @@ def follow(
     looks: float,
     patience: float = np.inf,
     wanted: float = SEEN,
+    leave: Callable[[Floats], Floats] | None = None,
 ) -> tuple[Linear, float, float]:
     """Follow a motion until it has decayed, or grows.
 
@@ -96,6 +102,8 @@ def follow(
         How many times that motion may need to decay: otherwise it is given up after a tenth.
     wanted : float
         ln |u|^2 at which motion has decayed.
+    leave : callable, optional
+        Takes motions that are known to decay out of u.
 
     Returns
     -------
@@ -118,6 +126,9 @@ def follow(
 
     logs, needed = [float(np.log(square()))], np.inf
     while len(logs) <= max(looks, 8):
+        if leave is not None:  # at each look: long steps turn them a little
+            kept = leave(np.concatenate([reference * z.ravel(), v.ravel()])).reshape(2, *z.shape)
+            z[:], v[:] = kept[0] / reference, kept[1]
         size = float(np.abs(v).max(initial=0.0)) or 1.0  # growth may be beyond all numbers
         x /= size
         before, squares, scale = x.copy(), [], scale + 2 * float(np.log(size))
@@ -273,10 +284,23 @@ def follow_decay(
             state -= np.outer(along, along @ state)
             common += 1
     limit, free = float(stable_timestep(c)), common + size - kept.shape[1]
-    wanted = _oscillating(csr_array(kept.T @ a @ kept), csr_array(kept.T @ g @ kept), common, REFERENCE * 2 / limit)
+    reference = REFERENCE * 2 / limit
+    stiffness, damping = (csr_array(kept.T @ each @ kept) for each in (a, g))
+    report_progress("the slowest motions are looked for")
+    slow = slow_motions(stiffness, damping, kept, reference, common)
+    values, errors, leave = slow or (np.full(1, -np.inf + 0j), np.zeros(1), None)
+    slowest = int(np.argmax(values.real))
+    s, rate, error = complex(values[slowest]), 2 * float(values[slowest].real), 2 * float(errors[slowest])
+    if rate > 0:
+        return Linear(False, rate, error, free, s, at_least=True)
+    wanted = _oscillating(stiffness, damping, common, reference)
     # a step takes the time of 2e4 multiplications at the least
     looks = work / (100 * (2e4 + a.nnz + g.nnz)) if time is None else time / (100 * STEP * limit)
-    found, now, needed = follow(a, g, limit, state, looks, 1.0 if time is None else np.inf, wanted)
+    found, now, needed = follow(a, g, limit, state, looks, 1.0 if time is None else np.inf, wanted, leave)
+    if found.stable and rate > found.growth_rate:
+        decays = f"the slowest decays with {exponential(rate, 6)}, and other {found.said}"
+        said = f"of {np.count_nonzero(values.imag >= 0)} slow motions, known one by one, {decays}"
+        found = replace(found, growth_rate=rate, error=error, s=s, said=said)
     if found.stable is not None:
         return replace(found, free=free)
     bound = min(searched, found.searched)

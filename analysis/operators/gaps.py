@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
+from ..assembly import each_of
 from ..configuration import Configuration
 from ..contacts import WALL
-from .linearised_contacts import particle_rows
 
 SAME_PLANE = 1e-7
 """Difference of two normals, and of two places over the mean radius, that are of one plane."""
@@ -22,17 +22,8 @@ SAME_PLANE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Pairs that nearly touch, G of them.
-
-    Attributes
-    ----------
-    i, j : ndarray of int, shape (G,)
-        Partners; j is -1 for a plane.
-    normal : ndarray, shape (G, 3)
-        Unit vector towards i.
-    gap : ndarray, shape (G,)
-        Distance of the surfaces, length.
-    """
+    """Pairs that nearly touch, G of them: partners, j = -1 for a plane; unit vectors towards i; distances of the
+    surfaces."""
 
     i: Indices
     j: Indices
@@ -41,33 +32,15 @@ class Gaps:
 
     def rates(self, configuration: Configuration) -> csr_array:
         """By how much each gap closes by displacements, shape (G, coordinates)."""
-        closing = np.hstack([-self.normal, np.zeros_like(self.normal)])
-        return particle_rows(configuration, (self.i, self.j), np.array([closing, -closing]))
+        return csr_array(each_of(-self.normal) @ configuration.pair_rows((self.i, self.j)))
 
 
 def near_pairs(
     position: Floats, radius: Floats, box: Floats, periodic: ArrayLike, apart: float = 0.0
 ) -> tuple[Indices, Indices, Floats]:
-    """Pairs of spheres whose surfaces are nearer than a distance, through the sides of the box, too.
-
-    The larger of two, or the later one, finds the other. A sphere that is near two images of another makes two pairs.
-
-    Parameters
-    ----------
-    position, radius : ndarray, shapes (N, 3) and (N,)
-        Centres and radii, length.
-    box : ndarray, shape (3, 3)
-        Edges in rows, with `periodic` of each.
-    apart : float
-        The distance, length; 0 for those that overlap.
-
-    Returns
-    -------
-    i, j : ndarray of int, shape (C,)
-        Ascending, i < j.
-    branch : ndarray, shape (C, 3)
-        From j to i, length.
-    """
+    """Pairs i < j of spheres whose surfaces are nearer than `apart`, 0 for those that overlap, ascending, and the
+    vectors from j to i, shape (C, 3); through the sides of the box, too, whose edges are rows. A sphere that is near
+    two images of another makes two pairs."""
     from scipy.spatial import cKDTree  # which takes as long to import as all of `scipy.sparse`
 
     tree, far = cKDTree(position), 2 * radius + apart

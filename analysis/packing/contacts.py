@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Indices, derive_frozen, floats, integers, same_bits, set_frozen
+from ..arrays import Booleans, EqualToTheBit, Floats, Indices, derive_frozen, exactly, floats, set_frozen
 
 FLOOR = -1
 """The index that stands for the floor as the second partner of a contact."""
 
 
-@dataclass(frozen=True, init=False, eq=False)
-class Contacts:
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Contacts(EqualToTheBit):
     """The contacts of a packing and their slips, kept in one canonical order.
 
     For any given order, a pair is stored with i < j (the slip does not change under the exchange), pairs are in
@@ -42,19 +42,17 @@ class Contacts:
     slip_low: Floats | None
 
     def __init__(self, i: ArrayLike, j: ArrayLike, slip: ArrayLike, slip_low: ArrayLike | None = None) -> None:
-        first, second = integers("i", i), integers("j", j)
-        if first.shape != second.shape:
-            raise ValueError(f"The contact arrays i and j have different shapes, {first.shape} and {second.shape}.")
+        count = np.size(i)
+        first, second = exactly("i", i, count, np.integer), exactly("j", j, count, np.integer)
         if np.any(first < 0) or np.any(second < FLOOR):
             raise ValueError("A contact has a negative disk index; only j may be -1, for the floor.")
         if np.any(first == second):
             raise ValueError(f"Disk {first[first == second][0]} is listed as touching itself.")
-        slips = floats("slip", slip, first.shape)
-        low = None if slip_low is None else floats("slip_low", slip_low, first.shape)
+        slips = floats("slip", slip, (count,))
+        low = None if slip_low is None else floats("slip_low", slip_low, (count,))
         floor = second == FLOOR
-        first, second = (
-            np.where(floor, first, np.minimum(first, second)), np.where(floor, FLOOR, np.maximum(first, second))
-        )  # fmt: skip
+        low_end, high_end = np.minimum(first, second), np.maximum(first, second)
+        first, second = np.where(floor, first, low_end), np.where(floor, FLOOR, high_end)
         order = np.lexsort((second, first, floor))
         first, second = first[order], second[order]
         twice = np.flatnonzero((np.diff(first) == 0) & (np.diff(second) == 0))
@@ -65,18 +63,11 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.i)
 
-    def __eq__(self, other: object) -> bool:
-        """Whether partners and slips are the same to the bit."""
-        return same_bits(self, other)
-
-    def __hash__(self) -> int:
-        return hash((len(self), self.slip.tobytes()))
-
     def __repr__(self) -> str:
         return f"<Contacts: {int((~self.floor).sum())} between disks, {int(self.floor.sum())} with the floor>"
 
     @property
-    def floor(self) -> NDArray[np.bool_]:
+    def floor(self) -> Booleans:
         """Which contacts are with the floor, shape (C,)."""
         return self.j == FLOOR
 

@@ -20,25 +20,27 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 
 from ..arrays import (
+    BY_DEFAULT,
+    Booleans,
+    EqualToTheBit,
     Floats,
     Indices,
-    booleans,
     derive_frozen,
+    exactly,
     floats,
     frozen,
     number,
     positive_each,
-    same_bits,
+    ratio,
     set_frozen,
 )
 from ..assembly import spring_of_layer
-from ..configuration import BY_DEFAULT, Configuration
+from ..configuration import Configuration
 from ..counted import counted
-from ..errors import BadInputError
 from .compensated import DoubleDouble
 from .contacts import Contacts
 from .disk_operators import Form, assemble_stiffness, contact_terms
@@ -48,7 +50,7 @@ from .linearise import linearise_contacts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Packing:
+class Packing(EqualToTheBit):
     """A configuration of disks with its contacts, law and load. Arrays are copied and made read-only.
 
     Parameters
@@ -99,7 +101,7 @@ class Packing:
     mass: Floats = BY_DEFAULT
     inertia_factor: float = 1.0
     box_length: float | None = None
-    top: NDArray[np.bool_] = BY_DEFAULT
+    top: Booleans = BY_DEFAULT
     fx: float = 0.0
     fy: float = 0.0
     position_low: Floats | None = None
@@ -111,40 +113,30 @@ class Packing:
         n = np.size(self.radius)
         if n == 0:
             raise ValueError("A packing needs at least one disk.")
+        usual = {"angle": np.zeros(n), "mass": np.ones(n), "top": np.zeros(n, bool)}
         given = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        for name, value in {"angle": np.zeros(n), "mass": np.ones(n), "top": np.zeros(n, bool)}.items():
-            given[name] = value if given[name] is None else given[name]
-        shapes = {"position": (n, 2), "radius": (n,), "angle": (n,), "mass": (n,), "position_low": (n, 2)}
-        values: dict[str, object] = {
-            name: floats(name, given[name], shape) for name, shape in shapes.items() if given[name] is not None
-        }
+        given |= {name: value for name, value in usual.items() if given[name] is None}
+        for name in ("radius", "mass"):
+            given[name] = positive_each(name, given[name], (n,))
+        for name, shape in {"position": (n, 2), "angle": (n,), "position_low": (n, 2)}.items():
+            given[name] = None if given[name] is None else floats(name, given[name], shape)
         for name in ("inertia_factor", "box_length", "drag_time", "fx", "fy", "spring"):
-            if given[name] is not None:
-                values[name] = number(name, given[name], positive=name not in ("fx", "fy", "spring"))
-        set_frozen(self, **values, top=booleans("top", given["top"], n), slips_known=bool(self.slips_known))
-        positive_each("radius", self.radius)
-        positive_each("mass", self.mass)
+            positive = name not in ("fx", "fy", "spring")
+            given[name] = None if given[name] is None else number(name, given[name], positive=positive)
+        given |= {"top": exactly("top", given["top"], n, np.bool_), "slips_known": bool(self.slips_known)}
+        set_frozen(self, **given)
         check_box(self.radius, self.box_length)
         _check_partners(self.contacts, n)
 
     def __len__(self) -> int:
         return len(self.radius)
 
-    def __eq__(self, other: object) -> bool:
-        """Whether every array and number is the same to the bit, low parts included."""
-        return same_bits(self, other)
-
-    def __hash__(self) -> int:
-        return hash((len(self), self.fx, self.position.tobytes()))
-
     def __repr__(self) -> str:
         box = "open sides" if self.box_length is None else f"period {self.box_length:g}"
-        load = f"fx = {self.fx:g}, fy = {self.fy:g}"
-        digits = ", compensated" if self.compensated else ""
         return (
-            f"<Packing: {counted(len(self), 'disk')}, {counted(len(self.contacts), 'contact')}, "
-            f"{int(self.top.sum())} in the upper "
-            f"layer, {box}, mu = {self.law.mu:g}, {load}{digits}>"
+            f"<Packing: {counted(len(self), 'disk')}, {counted(len(self.contacts), 'contact')}, {int(self.top.sum())} "
+            f"in the upper layer, {box}, mu = {self.law.mu:g}, fx = {self.fx:g}, fy = {self.fy:g}"
+            f"{', compensated' if self.compensated else ''}>"
         )
 
     dimension = 2
@@ -162,8 +154,7 @@ class Packing:
     @property
     def slip_share(self) -> Floats:
         """|s|/t* of each contact, shape (C,); zero without friction."""
-        limit = self.law.slip_limit(self.geometry.overlap)
-        return np.divide(np.abs(self.contacts.slip), limit, out=np.zeros_like(limit), where=limit > 0)
+        return ratio(np.abs(self.contacts.slip), self.law.slip_limit(self.geometry.overlap))
 
     @property
     def coordinates(self) -> int:
@@ -181,7 +172,7 @@ class Packing:
         return self.law.damped or self.drag_time is not None
 
     @property
-    def sliding(self) -> NDArray[np.bool_]:
+    def sliding(self) -> Booleans:
         """Which contacts are at Coulomb's bound, shape (C,); none without friction."""
         return self.law.at_bound(self.geometry.overlap, self.contacts.slip)
 
@@ -219,14 +210,7 @@ class Packing:
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The disks with their contacts to first order; BadInputError where numbers overflow."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            if not np.isfinite(self.residual) or not np.all(
-                np.isfinite(self.law.normal_stiffness(self.geometry.overlap))
-            ):
-                raise BadInputError(
-                    f"Forces overflow with kn = {self.law.kn:g}: take units in which numbers are smaller."
-                )
+        """The disks with their contacts to first order."""
         g, c, n = self.geometry, self.contacts, len(self)
         flat = np.zeros(len(c))
         arms = np.column_stack([self.radius[c.i], np.where(c.floor, 0.0, self.radius[c.j])])
@@ -268,17 +252,14 @@ class Packing:
     @property
     def mobilised(self) -> Floats:
         """|f_t|/(mu f_n), the mobilised fraction of Coulomb's bound, shape (C,); zero without friction."""
-        limit = self.law.mu * self.normal_force
-        return np.divide(np.abs(self.tangential_force), limit, out=np.zeros_like(limit), where=limit > 0)
+        return ratio(np.abs(self.tangential_force), self.law.mu * self.normal_force)
 
     @cached_property
     def rattlers(self) -> Indices:
         """Indices of the disks that touch nothing; their rows of the stability operator are zero."""
         closed = self.geometry.overlap > 0
-        alone = np.ones(len(self), dtype=np.bool_)
-        alone[self.contacts.i[closed]] = False
-        alone[self.contacts.j[closed & ~self.contacts.floor]] = False
-        return frozen(np.flatnonzero(alone))
+        touch = np.union1d(self.contacts.i[closed], self.contacts.j[closed])
+        return frozen(np.setdiff1d(np.arange(len(self)), touch))
 
     @cached_property
     def net_force(self) -> Floats:
@@ -315,15 +296,7 @@ class Packing:
         position_low: ArrayLike | None = None,
         fx: float | None = None,
     ) -> "Packing":
-        """The same disks at other positions; only the new values are checked.
-
-        Parameters
-        ----------
-        position, angle, contacts, position_low
-            As for the class.
-        fx : float, optional
-            Force along x on each disk of the upper layer; unchanged by default.
-        """
+        """The same disks at other positions; only the new values are checked. fx is unchanged by default."""
         n = len(self)
         _check_partners(contacts, n)
         return derive_frozen(
@@ -336,33 +309,17 @@ class Packing:
         )
 
     def with_dissipation(self, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> "Packing":
-        """The same equilibrium with dashpots and drag, by default none: they have no part in where a packing rests.
-
-        Parameters
-        ----------
-        cn, ct : float
-            Dashpots of every contact, as of :class:`~faultgouge.analysis.MindlinLaw`.
-        drag_time : float, optional
-            tau of the drag, time; none by default.
-        """
+        """The same equilibrium with dashpots of every contact and drag, by default none: they have no part in where a
+        packing rests."""
         return replace(self, law=replace(self.law, cn=cn, ct=ct), drag_time=drag_time)
 
     def loaded(self, least: float) -> "Packing":
-        """The packing without the contacts whose normal force does not exceed a given force.
-
-        A disk that nothing holds comes to rest barely touching another disk. The overlap, and so the stiffness, is then
-        rounding noise: of order (force / k_n)^(1/3), which is not small.
-
-        Parameters
-        ----------
-        least : float
-            Normal force that a contact must exceed.
-        """
-        kept = self.normal_force > least
-        if np.all(kept):
-            return self
-        c, low = self.contacts, self.contacts.slip_low
-        return replace(self, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept], None if low is None else low[kept]))
+        """The packing without the contacts whose normal force does not exceed a given one. A disk that nothing holds
+        comes to rest barely touching another: the stiffness of this contact is rounding, of order (force /
+        k_n)^(1/3)."""
+        kept, c = self.normal_force > least, self.contacts
+        low = None if c.slip_low is None else c.slip_low[kept]
+        return self if np.all(kept) else replace(self, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept], low))
 
     @property
     def smallest_overlap(self) -> float:
@@ -382,7 +339,7 @@ class Packing:
         self,
         *,
         form: Form = "consistent",
-        coupled: NDArray[np.bool_] | None = None,
+        coupled: Booleans | None = None,
         parting: ArrayLike = 0.5,
         sliding: ArrayLike = False,
     ) -> csr_array:
@@ -399,14 +356,13 @@ class Packing:
         zero = np.zeros_like(along)
         # K has N N^T times the normal and T T^T times the tangential stiffness
         matrix = self._assembled(Derivatives(zero, zero, along, -across, zero))
-        return (
-            matrix if self.drag_time is None else csr_array(matrix + diags_array(self.coordinate_mass / self.drag_time))
-        )
+        if self.drag_time is None:
+            return matrix
+        return csr_array(matrix + diags_array(self.coordinate_mass / self.drag_time))
 
     def _assembled(self, law: Derivatives, form: Form = "consistent") -> csr_array:
         """K of contacts with these derivatives."""
-        c, g = self.contacts, self.geometry
-        pairs = len(c) - np.count_nonzero(c.floor)
+        c, g, pairs = self.contacts, self.geometry, int(np.count_nonzero(~self.contacts.floor))
         terms = contact_terms(law, g.normal.T, g.distance, pairs, form)
         return assemble_stiffness(terms, c.i, c.j[:pairs], len(self))
 

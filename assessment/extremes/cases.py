@@ -31,11 +31,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import Contacts, MindlinLaw, Packing, spectrum, stable_timestep, stiffness_matrix, touching
@@ -43,8 +41,6 @@ from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import SAFETY, unit_rounding
 from ...pywrap import Engine, Equilibrium, equilibrate
 from ...pywrap.equilibria.rattlers import place_disks
-from ...pywrap.lammps.decks import Decks
-from ...pywrap.lammps.instance import lammps_instance
 from ...pywrap.runs.undamped import time_step
 from .packings import arches, at_rest, bed, crystal, law, shear_packing, with_low_parts
 
@@ -53,21 +49,8 @@ Measured = tuple[float, float, str]
 
 
 class Case(NamedTuple):
-    """Something to try.
-
-    Attributes
-    ----------
-    group : str
-        The kind of trouble.
-    name : str
-        What is tried.
-    run : callable
-        Collective over the ranks, with the same result on each: what was measured.
-    quick : bool
-        Whether it belongs to the small part of the cases.
-    refusal : str
-        Words of the sentence of one line with which it must be refused; empty where it must hold.
-    """
+    """Something to try: `run` is collective over the ranks, with the same result on each. The quick cases are a small
+    part. `refusal` has words of the sentence of one line with which it must be refused; empty where it must hold."""
 
     group: str
     name: str
@@ -83,23 +66,9 @@ def cases() -> list[Case]:
 
 def balance(equilibrium: Equilibrium) -> Measured:
     """Whether an equilibrium is one."""
-    overlap = equilibrium.packing.geometry.overlap
-    return (
-        equilibrium.residual / equilibrium.floor,
-        10.0,
-        f"largest force on a disk, {equilibrium.residual:.1e}, in units of what rounding leaves, "
-        f"{equilibrium.floor:.1e}; overlaps are from {overlap.min():.1e} to {overlap.max():.1e}",
-    )
-
-
-def rests(make: Callable[[], Packing]) -> Measured:
-    """Whether a packing has an equilibrium under shear."""
-    return balance(shear_packing(make()))
-
-
-def moves(make: Callable[[], Packing]) -> Measured:
-    """Whether the K of a packing is right."""
-    return derivative(make())
+    overlap, residual, floor = equilibrium.packing.geometry.overlap, equilibrium.residual, equilibrium.floor
+    says = f"largest force on a disk, {residual:.1e}, in units of what rounding leaves, {floor:.1e}; overlaps are from "
+    return residual / floor, 10.0, f"{says}{overlap.min():.1e} to {overlap.max():.1e}"
 
 
 def derivative(packing: Packing) -> Measured:
@@ -124,12 +93,9 @@ def derivative(packing: Packing) -> Measured:
     # Net forces are rounded once, coordinates known to their low parts; six differences over h, of six contacts.
     scale = np.abs(matrix).max()
     rounding = np.finfo(float).eps * np.abs(packing.net_force).max() / scale + packing.coordinate_rounding
-    return (
-        worst / scale,
-        1e-8 + 40 * rounding / width,
-        f"largest difference of -dF/dq and K q, in units of max |K|, 4 directions q, h = {width:.0e}; "
-        "the bound is the rounding of forces over h, and 1e-8 of curvature",
-    )
+    says = "largest difference of -dF/dq and K q, in units of max |K|, 4 directions q, h = "
+    says += f"{width:.0e}; the bound is the rounding of forces over h, and 1e-8 of curvature"
+    return worst / scale, 1e-8 + 40 * rounding / width, says
 
 
 LOADS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1)
@@ -146,6 +112,16 @@ PACKINGS: dict[str, Callable[[], Packing]] = {
 
 QUICK = {"k_n = 1e2", "k_n = 1e12", "load 1e-12 k_n, a crystal", "load 0.1 k_n, a crystal", "mu = 0", "mu = 1e-06"}
 QUICK |= {"k_t = 10 k_n", "sizes 1 : 50"}
+
+
+def rests(make: Callable[[], Packing]) -> Measured:
+    """Whether a packing has an equilibrium under shear."""
+    return balance(shear_packing(make()))
+
+
+def moves(make: Callable[[], Packing]) -> Measured:
+    """Whether the K of a packing is right."""
+    return derivative(make())
 
 
 def stiffness_and_load() -> Iterator[Case]:
@@ -168,31 +144,12 @@ def stiffness_and_load() -> Iterator[Case]:
     yield case("F_x without friction", partial(under, law(mu=0.0), 1e-3), True, "flows")
 
 
-def disks(places: list[tuple[float, float]], slip: float | None = None, **changes: Any) -> Packing:
+def disks(*places: tuple[float, float], slip: float | None = None, **changes: Any) -> Packing:
     """Disks of radius 1/2 with compensated coordinates; with a slip, the first two are in contact, touching or not."""
     position, radius = np.array(places), np.full(len(places), 0.5)
-    contacts = touching(position, radius, None)
-    if slip is not None:
-        contacts = Contacts(np.array([0]), np.array([1]), np.array([slip]), np.zeros(1))
+    contacts = touching(position, radius, None) if slip is None else Contacts([0], [1], [slip], [0])
     values: dict[str, Any] = {"position": position, "position_low": 0 * position, "radius": radius, "law": law()}
     return Packing(**(values | {"contacts": contacts} | changes))
-
-
-def deck(places: list[tuple[float, float]], *commands: str) -> None:
-    """LAMMPS with disks of diameter one at given places, and commands; every rank has an instance of its own."""
-    instance = lammps_instance(MPI.COMM_SELF, None)
-    try:
-        for line in (
-            *("units lj", "dimension 2", "boundary p f p", "atom_style sphere", "comm_modify vel yes"),
-            *("region box block 0 10 -2 12 -0.5 0.5", "create_box 1 box"),
-            *(f"create_atoms 1 single {x!r} {y!r} 0.0" for x, y in places),
-            *("set group all diameter 1.0", "set group all mass 1.0"),
-            *("pair_style mindlin/smooth 2e5 5e4 1.0", "pair_coeff * *"),
-            *("fix floor all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.0", "fix move all nve/disc 1.0", *commands),
-        ):
-            Decks(instance).command(line)
-    finally:
-        instance.close()
 
 
 def geometry() -> Iterator[Case]:
@@ -201,12 +158,12 @@ def geometry() -> Iterator[Case]:
     def column(*places: tuple[float, float]) -> Measured:
         """One on top of the other, upright: all contacts carry F_y."""
         top = np.arange(len(places)) == len(places) - 1
-        error = np.abs(at_rest(disks([*places], top=top, fy=3.0)).packing.normal_force / 3.0 - 1).max()
+        error = np.abs(at_rest(disks(*places, top=top, fy=3.0)).packing.normal_force / 3.0 - 1).max()
         return error, 1e-14, "relative error of the normal forces against F_y; nothing pushes an unstable column"
 
     def zero_overlap() -> Measured:
         """Exactly touching is no contact, for the pair style as for the analysis."""
-        packing = disks([(3.0, 3.0), (4.0, 3.0)], slip=0.0)
+        packing = disks((3.0, 3.0), (4.0, 3.0), slip=0.0)
         with Engine(packing) as engine:
             found = engine.displace(packing, np.zeros(6))
             force = np.abs(engine.net_force).max()
@@ -215,7 +172,7 @@ def geometry() -> Iterator[Case]:
 
     def at_the_bound() -> Measured:
         """|f_t| = mu f_n to the bit, and no tangential stiffness."""
-        packing = disks([(3.0, 3.999), (3.0, 3.0)], slip=1.0)
+        packing = disks((3.0, 3.999), (3.0, 3.0), slip=1.0)
         with Engine(packing) as engine:
             engine.displace(packing, np.zeros(6))
             along, normal = engine.net_force.reshape(3, 2)[:2, 0]
@@ -226,7 +183,7 @@ def geometry() -> Iterator[Case]:
 
     def grazing() -> Measured:
         """A disk passes another at an overlap of 1e-12 for one step."""
-        aside = disks([(2.999, 4.0), (3.0, 3.0)], position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]))
+        aside = disks((2.999, 4.0), (3.0, 3.0), position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]))
         step = np.array([3.0 - aside.position[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0])
         with Engine(aside) as engine:
             closest = engine.displace(aside, step)
@@ -244,16 +201,13 @@ def geometry() -> Iterator[Case]:
     yield case("grazing", grazing, True)
     for wide in (3, 10, 100, 1000, 10_000):
         yield case(f"box {wide} wide", partial(rests, partial(crystal, wide)), wide < 100)
-    centred, inside = [(3.0, 3.0), (3.0, 3.0)], [(3.0, 3.0), (3.4, 3.0)]
-    for name, make, quick, words in (
-        ("box 2 wide", lambda: crystal(2), True, "under two largest diameters"),
-        ("one centre", lambda: stiffness_matrix(disks(centred, slip=0.0)), True, "same centre"),
-        ("one centre, LAMMPS", lambda: deck(centred, "run 0"), True, "have the same centre"),
-        ("a centre inside of the other disk, LAMMPS", lambda: deck(inside, "run 0"), False, "law does not hold"),
-        ("a coordinate that is no number", lambda: disks([(3.0, np.nan), (9.0, 9.0)], slip=0.0), True, "not finite"),
-        ("k_n infinite", lambda: MindlinLaw(float("inf"), 1.0, 1.0), True, "must be finite"),
+    for name, make, words in (
+        ("box 2 wide", partial(crystal, 2), "under two largest diameters"),
+        ("one centre", lambda: stiffness_matrix(disks((3.0, 3.0), (3.0, 3.0), slip=0.0)), "same centre"),
+        ("a coordinate that is no number", lambda: disks((3.0, np.nan), (9.0, 9.0), slip=0.0), "not finite"),
+        ("k_n infinite", lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
     ):
-        yield case(name, make, quick, words)
+        yield case(name, make, True, words)
 
 
 @cache
@@ -266,11 +220,6 @@ def smooth_mode() -> tuple[Packing, Floats, float]:
     return packing, vectors[:, -1], stable_timestep(float(np.sqrt(values[-1])))
 
 
-def moved_by(packing: Packing, step: Floats) -> Packing:
-    """The packing with disks displaced by (x.., y..)."""
-    return place_disks(packing, packing.position + step.reshape(2, -1).T)
-
-
 def time_stepping() -> Iterator[Case]:
     """Undamped runs at the limit of the time step."""
 
@@ -278,8 +227,8 @@ def time_stepping() -> Iterator[Case]:
         """Amplitude of the stiffest mode after so many steps of a share of the limit, in units of the first."""
         packing, mode, limit = smooth_mode()
         size = amplitude * packing.geometry.overlap.min()
-        found = []
-        with Engine(moved_by(packing, size * mode)) as engine, engine.undamped(share * limit) as dynamics:
+        start, found = place_disks(packing, packing.position + size * mode.reshape(2, -1).T), []
+        with Engine(start) as engine, engine.undamped(share * limit) as dynamics:
             for forward in np.diff(steps, prepend=0).tolist():
                 apart = dynamics.advance(forward).position - packing.position
                 found.append(mode @ apart.T.ravel() / size)
@@ -287,13 +236,10 @@ def time_stepping() -> Iterator[Case]:
 
     def below_the_limit(share: float) -> Measured:
         steps = 100 * np.arange(1, 101)
-        phase = np.arccos(1 - 2 * share**2)
-        return (
-            np.abs(excite_mode(share, 1e-4, steps) - np.cos(steps * phase)).max(),
-            1e-3,
-            "stiffest mode against cos(n Omega dt) over 10000 steps, in units of its amplitude; that is 0.0001 of the "
-            "smallest overlap, so that K is frozen up to that and modes mix at the square of it",
-        )
+        off = excite_mode(share, 1e-4, steps) - np.cos(steps * np.arccos(1 - 2 * share**2))
+        says = "stiffest mode against cos(n Omega dt) over 10000 steps, in units of its amplitude; that is 0.0001 of "
+        says += "the smallest overlap, so that K is frozen up to that and modes mix at the square of it"
+        return np.abs(off).max(), 1e-3, says
 
     def limit_is_sharp() -> Measured:
         """Beyond the limit that the refusal protects, motion grows as theory predicts."""
@@ -302,17 +248,14 @@ def time_stepping() -> Iterator[Case]:
         error = abs(np.log(last / first) / (20 * kappa) - 1)
         return error, 1e-3, f"growth of the stiffest mode against kappa = {kappa:.4g} a step: the limit is sharp"
 
-    case = partial(Case, "time stepping")
-    yield case("step of 0.5 of the limit", partial(below_the_limit, 0.5), True)
-    yield case("step of 0.99 of the limit", partial(below_the_limit, 0.99), True)
-
     def too_long() -> float:
         return time_step(smooth_mode()[0], 1.01 * smooth_mode()[2])
 
+    case = partial(Case, "time stepping")
+    yield case("step of 0.5 of the limit", partial(below_the_limit, 0.5), True)
+    yield case("step of 0.99 of the limit", partial(below_the_limit, 0.99), True)
     yield case("step of 1.01 of the limit", too_long, True, "over the limit 2/omega_max")
     yield case("step of 1.01 of the limit, LAMMPS alone", limit_is_sharp, True)
-    far = partial(deck, [(3.0, 3.0)], "velocity all set 0.0 -1.0 0.0", "timestep 0.6", "run 10")
-    yield case("more than a radius in one step, LAMMPS", far, False, "farther than its radius")
 
 
 def eigenvalue_cases() -> Iterator[Case]:
@@ -328,23 +271,21 @@ def eigenvalue_cases() -> Iterator[Case]:
         matrix = turn @ matrix @ turn.T
         values = eigvals(matrix)
         one, other = values[np.argsort(np.abs(values - 1))[:2]]
-        return (
-            abs((one - other) ** 2 - exact),
-            10.0 * unit_rounding(matrix) * 4 * split,  # LAPACK's backward error is a few u |A|
-            f"error of D = {exact:.2g}, the squared split of LAPACK's two eigenvalues, ten times 4 d u |A| the bound; "
-            f"the split is {abs(exact) ** 0.5:.2g}, of LAPACK's eigenvalues {abs(one - other):.2g}",
-        )
+        says = f"error of D = {exact:.2g}, the squared split of LAPACK's two eigenvalues, ten times 4 d u |A| the "
+        says += f"bound; the split is {abs(exact) ** 0.5:.2g}, of LAPACK's eigenvalues {abs(one - other):.2g}"
+        # LAPACK's backward error is a few u |A|
+        return abs((one - other) ** 2 - exact), 10.0 * unit_rounding(matrix) * 4 * split, says
 
     def scales() -> Measured:
         """Eigenvalues over k_n are the same for all k_n at the same load over k_n."""
-        scaled = np.array(
-            [np.sort(spectrum(crystal(3, 2, law(10.0**n))).eigenvalues.real) / 10.0**n for n in range(2, 13, 2)]
-        )
+        found = [spectrum(crystal(3, 2, law(kn))).eigenvalues.real / kn for kn in 10.0 ** np.arange(2, 13, 2)]
+        scaled = np.sort(found)
         says = "eigenvalues / k_n of a crystal for k_n from 1e2 to 1e12, in units of the largest: 50 roundings"
         return np.abs(scaled - scaled[0]).max() / scaled[0].max(), SAFETY * np.finfo(float).eps, says
 
     case = partial(Case, "eigenvalues")
-    for n, sign in product((4, 6, 8, 10, 12, 14, 16), (-1, 1)):
-        name = f"pair at eps = {sign * 10.0**-n:+.0e}, {'complex' if sign > 0 else 'real'}"
-        yield case(name, partial(near_defective, sign * 10.0**-n), n in (4, 10, 16))
+    for n in (4, 6, 8, 10, 12, 14, 16):
+        for sign, kind in ((-1, "real"), (1, "complex")):
+            eps = sign * 10.0**-n
+            yield case(f"pair at eps = {eps:+.0e}, {kind}", partial(near_defective, eps), n in (4, 10, 16))
     yield case("eigenvalues over k_n", scales, True)

@@ -22,8 +22,8 @@ from ...figures.style import INK, report_failure, save, styled
 from ..results import AssessmentError, reason_of, write_results
 from .cases import Case, cases
 
-LOWEST = 1e-6
-"""Left end of the picture, in units of the bound; what is smaller, such as an exact zero, is drawn there."""
+LOWEST, BEYOND = 1e-6, 8.0
+"""Ends of the picture, in units of the bound; what is smaller, such as an exact zero, or larger is drawn there."""
 
 Outcome = dict[str, Any]
 """name, group, status ("holds", "refused" or "fails"), figure, bound, says: the criterion, or the sentence."""
@@ -36,22 +36,8 @@ def extremes(
     progress: Callable[[Sequence[Case]], Iterable[Case]] = lambda cases: cases,
     wanted: Sequence[Case] | None = None,
 ) -> dict[str, Any]:
-    """Try the cases and leave extremes.json, extremes.md and extremes.png in a folder.
-
-    Parameters
-    ----------
-    output : Path
-        The folder, made if need be.
-    quick : bool
-        Only the small part of the cases.
-    wanted : sequence of Case, optional
-        By default all of :func:`.cases.cases`.
-
-    Returns
-    -------
-    dict
-        What extremes.json holds: each case's name, group, status, figure, bound and what it says.
-    """
+    """Try the cases, or the quick ones alone, and leave extremes.json, extremes.md and extremes.png in a folder, which
+    is made if need be; returns what extremes.json holds."""
     root, done = MPI.COMM_WORLD.rank == 0, list[Outcome]()
     if root:
         make_folder(output, "extremes.json", "extremes.md")
@@ -77,9 +63,8 @@ def try_case(case: Case) -> Outcome:
     except Exception as error:
         if getattr(error, "one_rank", False):
             raise
-        said = str(error).strip()
-        sentence = isinstance(error, ValueError | FaultgougeError) and "\n" not in said and "Traceback" not in said
-        if sentence and case.refusal and case.refusal in said:
+        said, sentence = str(error).strip(), isinstance(error, ValueError | FaultgougeError)
+        if sentence and "\n" not in said and case.refusal and case.refusal in said:
             return about | {"status": "refused", "says": said}
         return about | {"says": reason_of(error)}
     if case.refusal:
@@ -103,12 +88,15 @@ def extremes_figure(done: Sequence[Outcome]) -> Figure:
     figure = Figure(figsize=(5.4, 0.135 * len(done) + 1.2), layout="constrained")
     axes = figure.add_subplot()
     statuses = ("holds", "hold", "oC1"), ("refused", "refused, as they should be", "sC2"), ("fails", "fail", "XC0")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        figures, bounds = np.array([(each["figure"], each["bound"]) for each in done], dtype=float).T
+        ratios = np.clip(np.nan_to_num(figures / bounds), LOWEST, BEYOND)
+        ratios[np.isnan(figures)] = BEYOND
     for status, words, style in statuses:
-        rows = [row for row, each in enumerate(done) if each["status"] == status]
-        ratios = [8.0 if done[row]["figure"] is None else _ratio(done[row]) for row in rows]
-        axes.plot(ratios, rows, style[0], color=style[1:], label=f"{len(rows)} {words}")
+        rows = np.flatnonzero([each["status"] == status for each in done])
+        axes.plot(ratios[rows], rows, style[0], color=style[1:], label=f"{len(rows)} {words}")
         if status != "refused":
-            axes.hlines(rows, LOWEST, ratios, color=style[1:], linewidth=0.6, alpha=0.5)
+            axes.hlines(rows, LOWEST, ratios[rows], color=style[1:], linewidth=0.6, alpha=0.5)
     axes.axvline(1, color=INK, linewidth=0.8)
     axes.set(xscale="log", xlim=(0.4 * LOWEST, 30), ylim=(len(done), -1), xlabel="figure / bound")
     axes.set_yticks(range(len(done)), [each["name"] for each in done], fontsize=7)
@@ -117,9 +105,3 @@ def extremes_figure(done: Sequence[Outcome]) -> Figure:
     axes.minorticks_off()
     figure.legend(loc="outside upper center", ncols=3)
     return figure
-
-
-def _ratio(case: Outcome) -> float:
-    """The figure in units of its bound, within the picture."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.clip(np.nan_to_num(np.divide(case["figure"], case["bound"])), LOWEST, 8))

@@ -13,6 +13,7 @@ discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.windows`). Both
 from __future__ import annotations
 
 from functools import partial
+from itertools import count
 
 import numpy as np
 
@@ -67,7 +68,7 @@ def relaxation(settings: Settings) -> Study:
             return engine.packing, steps
 
         plain, fine = (1e-1, 1e-4, 1e-7, 0.0), (1e-1, 1e-4, 1e-7, 1e-12, 0.0)
-        runs: list[Run[Packing]] = [("Newton", force, partial(newton, engine, start, force)) for force in plain]
+        runs: list[Run] = [("Newton", force, partial(newton, engine, start, force)) for force in plain]
         runs += [
             ("Newton" + COMPENSATED_SUFFIX, force, partial(newton, careful, careful_start, force)) for force in fine
         ]
@@ -75,8 +76,7 @@ def relaxation(settings: Settings) -> Study:
         forces = np.logspace(-3, -9, 4 if settings.quick else 7).tolist()
         runs += [("overdamped", force, partial(overdamped, force)) for force in forces]
         # errors of the forces as independent ones on all coordinates, through K^-1
-        softness = float(np.sqrt(np.mean(values**-2.0)))
-        reference_error = end.floor * softness
+        reference_error = end.floor * float(np.sqrt(np.mean(values**-2.0)))
         # both increments of the compensated arithmetic end at the same packing
         points, _ = timed(runs, settings, lambda packing: distance(packing, end.packing) or reference_error)
     numbers = {"packing": end.packing, "start": start, "slowest": slowest, "fastest": fastest}
@@ -85,9 +85,7 @@ def relaxation(settings: Settings) -> Study:
 
 def scan(path: Path, increment: float) -> tuple[float, int]:
     """The onset in the middle of the first increment that ends in a complex pair, and the number of equilibria."""
-    k = 1
-    while not spectrum(path(k * increment)).pairs:
-        k += 1
+    k = next(k for k in count(1) if spectrum(path(k * increment)).pairs)
     return (k - 0.5) * increment, k
 
 
@@ -120,7 +118,7 @@ def onset(settings: Settings) -> Study:
             return found.fx_c, computed
 
         fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
-        runs: list[Run[float]] = [("scan, Newton", h, partial(lambda h: scan(fresh(), h), h)) for h in fine]
+        runs: list[Run] = [("scan, Newton", h, partial(lambda h: scan(fresh(), h), h)) for h in fine]
         coarse = (4e-3,) if quick else (4e-3, 2e-3, 1e-3)
         runs += [("root of the discriminant", h, partial(by_root, h)) for h in coarse]
         points, _ = timed(runs, settings, lambda fx: max(abs(fx - exact), resolution))

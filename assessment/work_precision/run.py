@@ -44,21 +44,10 @@ def report(
     progress: Callable[[str, Sequence[Any]], Iterable[Any]] = lambda _, runs: runs,
     studies: dict[str, Callable[[Settings], Study]] = STUDIES,
 ) -> dict[str, Any]:
-    """Run the studies and leave report.md, report.json and a figure for each in a folder.
+    """Run the studies and leave report.md, report.json and a figure for each in a folder, which is made if need be.
 
-    Parameters
-    ----------
-    output : Path
-        The folder, made if need be.
-    quick : bool
-        Whether to compute fewer points, in half a minute instead of two.
-    progress : callable
-        Called with the name of a list of runs and the list; returns an iterable that shows how far it is.
-
-    Raises
-    ------
-    AssessmentError
-        After all studies, if one has failed.
+    Raises AssessmentError after all studies, if one has failed. `progress` is called with the name of a list of runs
+    and the list; it returns an iterable that shows how far it is.
     """
     make_folder(output, "report.json", "report.md")
     scene, done, failed = Scene.from_toml(SCENE), list[Study](), list[dict[str, str]]()
@@ -109,28 +98,27 @@ def figure_of(study: Study) -> Figure:
     """
     figure = Figure(figsize=(6.8, 3.5), layout="constrained")
     left, right = panels = figure.subplots(1, 2, sharey=True)
-    bottom = 0.3 * min(point["error"] for point in study["points"])
-    own, abscissa = study["reference_error"], study["abscissa"]
-    methods = list(dict.fromkeys(point["method"] for point in study["points"]))
+    points, abscissa = study["points"], study["abscissa"]
+    bottom = 0.3 * min(point["error"] for point in points)
+    methods = list(dict.fromkeys(point["method"] for point in points))
     families = list(dict.fromkeys(method.removesuffix(COMPENSATED_SUFFIX) for method in methods))
     for method in methods:
-        points = [point for point in study["points"] if point["method"] == method]
-        error, careful = [point["error"] for point in points], method.endswith(COMPENSATED_SUFFIX)
-        number = families.index(method.removesuffix(COMPENSATED_SUFFIX))
+        own = [point for point in points if point["method"] == method]
+        error, number = [point["error"] for point in own], families.index(method.removesuffix(COMPENSATED_SUFFIX))
+        line, face = ("--", "white") if method.endswith(COMPENSATED_SUFFIX) else ("-", f"C{number}")
+        if len(set(np.sign(np.diff(error))) - {0.0}) > 1:
+            line = "none"
         # the first is the largest: markers that coincide are both seen
         style: dict[str, Any] = {"color": f"C{number}", "marker": "osD^vP"[number], "markersize": 6.5 - number}
-        style |= {"linestyle": "--" if careful else "-", "markerfacecolor": "white" if careful else f"C{number}"}
-        if len(set(np.sign(np.diff(error))) - {0.0}) > 1:
-            style["linestyle"] = "none"
-        left.plot([point["seconds"] for point in points], error, label=method, **style)
-        seen = [(point[abscissa], e) for point, e in zip(points, error, strict=True) if point[abscissa]]
-        right.plot(*np.transpose(seen), **style)
+        style |= {"linestyle": line, "markerfacecolor": face}
+        left.plot([point["seconds"] for point in own], error, label=method, **style)
+        right.plot(*np.transpose([(point[abscissa], point["error"]) for point in own if point[abscissa]]), **style)
     left.set(xscale="log", yscale="log", xlabel="wall time, s", ylabel=_label(study["error"]))
     left.set_ylim(bottom=bottom)
     right.set(xscale="log", xlabel=_label(study[abscissa]))
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, columnspacing=1.2)
     for axes in panels:
-        axes.axhspan(bottom, max(own, bottom), color="#e9e9e9", linewidth=0, zorder=0)
+        axes.axhspan(bottom, max(study["reference_error"], bottom), color="#e9e9e9", linewidth=0, zorder=0)
         axes.grid(color=INK, alpha=0.12, linewidth=0.4)
     return figure
 

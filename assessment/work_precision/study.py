@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -29,9 +29,7 @@ WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding=
 COMPENSATED_SUFFIX = ", compensated"
 """Ends the name of a method in compensated arithmetic."""
 
-T = TypeVar("T")
-
-Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
+Run = tuple[str, float | None, Callable[[], tuple[Any, int | None]]]
 """A method, the parameter that sets its accuracy, and what it computes: a result, and the work that it took, counted in
 what does not depend on the machine."""
 
@@ -41,21 +39,9 @@ Study = dict[str, Any]
 
 @dataclass(frozen=True)
 class Settings:
-    """The settings of a study.
-
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the ramp, with a section [ramp].
-    ramp : tuple of Equilibrium
-        Its equilibria by increasing F_x, from 0 to beyond the onset.
-    quick : bool
-        Whether fewer points and shorter runs have to do.
-    repeats : int
-        Runs of which the median of the times is taken.
-    progress : callable
-        Wraps the list of runs of a study, to show how far it is.
-    """
+    """What all studies have: a scene with a ramp, and its equilibria by increasing F_x, from 0 to beyond the onset;
+    whether fewer points and shorter runs have to do; the number of runs of which the median of the times is taken; and
+    what wraps the list of runs of a study, to show how far it is."""
 
     scene: Scene
     ramp: tuple[Equilibrium, ...]
@@ -78,13 +64,13 @@ class Point(NamedTuple):
     evaluations: int | None
 
 
-def timed(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float]) -> tuple[list[Point], list[T]]:
+def timed(runs: Sequence[Run], settings: Settings, error: Callable[[Any], float]) -> tuple[list[Point], list[Any]]:
     """Points of runs, and their results. Runs are made in one thread, several times.
 
     The runs take turns, so that other load of the machine affects all of them alike. Every other turn begins with the
     last run.
     """
-    places, found = range(len(runs)), dict[int, tuple[T, int | None]]()
+    places, found = range(len(runs)), dict[int, Any]()
     seconds = np.empty((settings.repeats, len(runs)))
     order = [(turn, k) for turn in range(settings.repeats) for k in (places[::-1] if turn % 2 else places)]
     with threadpool_limits(1):
@@ -98,22 +84,10 @@ def timed(runs: Sequence[Run[T]], settings: Settings, error: Callable[[T], float
 
 
 def study_of(section: str, points: list[Point], reference_error: float, numbers: dict[str, Any], **more: Any) -> Study:
-    """Make a study from its results and from the texts of words.toml.
+    """Make a study from its results and from a section of words.toml, whose texts use the numbers.
 
-    Parameters
-    ----------
-    section : str
-        Of words.toml: name, question, what the numbers of the points are, two sentences of advice and remarks, and the
-        x axis ("evaluations" or "parameter") of the second panel of the figure.
-    points : sequence of Point
-        By method.
-    reference_error : float
-        The reference's own error, in the unit of the errors.
-    numbers : mapping
-        Numbers that the texts use; the texts also have `orders`, `points`, and by method the point of least error,
-        `best`.
-    **more
-        orders : those that theory predicts, of `fit_order`.
+    The texts also have `points`, by method the point of least error, `best`, and what else is given: `orders`, those
+    that theory predicts, of `fit_order`. The reference's own error is in the unit of the errors.
     """
     best = {point.method: point for point in sorted(points, key=lambda each: -each.error)}
     known = {"points": points, "best": best, **numbers, **more}
@@ -122,12 +96,11 @@ def study_of(section: str, points: list[Point], reference_error: float, numbers:
         for name, text in WORDS[section].items()
     }
     rows = [point._asdict() for point in points]
-    return said | {"orders": []} | {"reference_error": reference_error, "points": rows} | more
+    return said | {"orders": [], "reference_error": reference_error, "points": rows} | more
 
 
 def compensate(equilibrium: Equilibrium) -> Equilibrium:
-    """The same equilibrium in compensated arithmetic: coordinates with low parts, and forces balanced to its rounding
-    floor."""
+    """The same equilibrium with low parts of coordinates, its forces balanced to the rounding floor of these."""
     packing = replace(equilibrium.packing, position_low=np.zeros_like(equilibrium.packing.position))
     with Engine(packing) as engine:
         return equilibrate(engine, replace(equilibrium, packing=packing), packing.fx)
@@ -141,9 +114,7 @@ def fit_order(
     Errors below `least` are those of the floor or of the reference, errors above `most` are not yet asymptotic. If
     fewer than three points are left, the error is a ValueError.
     """
-    chosen = [p for p in points if p.method == method and p.parameter and least < p.error < most]
-    if len(chosen) < 3:
-        raise ValueError(f"{len(chosen)} points of {method} are between {least:.1e} and {most:.1e}: an order needs 3")
+    chosen = [p for p in points if p.method == method and least < p.error < most]
     law = fit_power_law([point.parameter or np.nan for point in chosen], [point.error for point in chosen])
-    expectation = {"method": method, "expected": expected, "points": len(chosen)}
-    return expectation | {"order": law.exponent, "error": law.error}
+    known = {"method": method, "expected": expected, "points": len(chosen)}
+    return known | {"order": law.exponent, "error": law.error}

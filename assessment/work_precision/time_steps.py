@@ -8,15 +8,6 @@ Velocity Verlet is of second order as long as the slip increment is. The force i
 Coulomb's bound and the clamp is applied at the end of the step, so that passing the bound costs no order. A contact
 that *forms* during the run would: its slip begins with zero at the end of a step.
 
-A readable version in NumPy is the reference for the motion that the pair style integrates. A step moves the disks by
-:math:`\mathbf v\,\Delta t` with the velocities of the half step, advances each slip by
-
-.. math:: \Delta s = \boldsymbol\tau \cdot \Delta(\mathbf r_i - \mathbf r_j) - (\Delta u_i + \Delta u_j)
-
-and clamps it. While a contact turns by :math:`\Delta\varphi` and is compressed by :math:`\Delta\delta`, the tangent at
-the end of the step errs by :math:`\tfrac12 \Delta\varphi\, \Delta\delta` in each step, and so by the first order of
-:math:`\Delta t` in a given time; the tangent at the middle by the second order.
-
 **Growth rate.** The mode of a packing that grows fastest is excited in LAMMPS and measured: the packing is displaced
 along the mode and left to undamped dynamics. The velocity, projected on the mode's left vector,
 :math:`b = y^H M^{1/2} \dot q`, contains that mode alone, and at equal intervals h obeys
@@ -42,7 +33,7 @@ from ...analysis import MindlinLaw, Packing, dynamical_matrix, stable_timestep, 
 from ...analysis.arrays import Floats
 from ...analysis.motion.eigenvalues import unit_rounding
 from ...pywrap import Engine
-from .study import Run, Settings, Study, compensate, fit_order, study_of, timed
+from .study import Settings, Study, compensate, fit_order, study_of, timed
 
 TIME, COARSEST = 2.0, 200
 """Length of the run of three disks, two swings of the overlaps, and its fewest steps: 60 to a period of the fastest
@@ -68,49 +59,27 @@ def three_disks() -> Packing:
     return Packing(position=position, radius=radius, contacts=contacts, law=law, top=top, fx=0.3, fy=3.0)
 
 
-def verlet(packing: Packing, steps: int) -> tuple[Floats, int]:
-    """(x, y, u) of the disks after `TIME` from rest, shape (3, N), length; no contact may form or open."""
-    i, j, pair, dt = packing.contacts.i, packing.contacts.j, ~packing.contacts.floor, TIME / steps
-    mass = packing.mass * np.array([[1.0], [1.0], [packing.inertia_factor]])
-    velocity = np.zeros_like(mass)
-    for _ in range(steps):
-        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
-        step = dt * velocity
-        moved, turned = step[:2, i] - step[:2, j] * pair, step[2, i] + step[2, j] * pair
-        position, angle = packing.position + step[:2].T, packing.angle + step[2] / packing.radius
-        there = packing.moved(position, angle, packing.contacts)
-        middle = packing.moved(position - 0.5 * step[:2].T, angle, packing.contacts)
-        slip = packing.contacts.slip + np.sum(middle.geometry.tangent.T * moved, axis=0) - turned
-        clamped = packing.law.clamped(there.geometry.overlap, slip)
-        packing = packing.moved(position, angle, packing.contacts.slipped(clamped))
-        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
-    return np.array([*packing.position.T, packing.scaled_angle]), steps
-
-
 def trajectory(settings: Settings) -> Study:
-    """Where three disks are after a time, by LAMMPS and NumPy. The reference is Richardson's extrapolation of LAMMPS's
-    runs with the most steps."""
-    packing = three_disks()
-    fine, coarse, finest = (8, 5, 204_800) if settings.quick else (10, 7, 819_200)
-    steps = [COARSEST * 2**k for k in range(fine)]
+    """Where three disks are after a time. The reference is Richardson's extrapolation of the runs with the most
+    steps."""
+    packing, (runs, finest) = three_disks(), (8, 204_800) if settings.quick else (10, 819_200)
     with Engine(packing) as engine:
 
-        def in_lammps(count: int) -> tuple[Floats, int]:
+        def run(steps: int) -> tuple[Floats, int]:
             engine.restore(packing)
-            with engine.undamped(TIME / count) as dynamics:
-                dynamics.advance(count)
+            with engine.undamped(TIME / steps) as dynamics:
+                dynamics.advance(steps)
                 end = engine.packing
-            return np.array([*end.position.T, end.scaled_angle]), count
+            return np.array([*end.position.T, end.scaled_angle]), steps
 
-        ends = [in_lammps(finest // part)[0] for part in (4, 2, 1)]
+        ends = [run(finest // part)[0] for part in (4, 2, 1)]
         rough, exact = ((4 * ends[k + 1] - ends[k]) / 3 for k in (0, 1))
-        runs: list[Run[Floats]] = [("LAMMPS", TIME / n, partial(in_lammps, n)) for n in steps]
-        runs += [("NumPy", TIME / n, partial(verlet, packing, n)) for n in steps[:coarse]]
-        points, found = timed(runs, settings, lambda end: float(np.abs(end - exact).max()))
+        steps = [COARSEST * 2**k for k in range(runs)]
+        timings = [("LAMMPS", TIME / n, partial(run, n)) for n in steps]
+        points, _ = timed(timings, settings, lambda end: float(np.abs(end - exact).max()))
     reference_error = float(np.abs(exact - rough).max())
-    apart = float(np.abs(np.subtract(found[:coarse], found[fine:])).max())
-    orders = [fit_order(points, name, 2, least=100 * reference_error) for name in ("LAMMPS", "NumPy")]
-    return study_of("trajectory", points, reference_error, {"apart": apart}, orders=orders)
+    order = fit_order(points, "LAMMPS", 2, least=100 * reference_error)
+    return study_of("trajectory", points, reference_error, {}, orders=[order])
 
 
 def growth(settings: Settings) -> Study:
@@ -129,15 +98,11 @@ def growth(settings: Settings) -> Study:
     displacement[active], onto[active] = right[:, k], left[:, k]
     start = displacement.real / root
     start *= AMPLITUDE / np.abs(start).max()
-
-    def off(omega: complex) -> float:
-        """Relative error of a growth rate, no less than the rounding of a number."""
-        return max(abs(2 * abs(omega.imag) / exact - 1), float(np.finfo(float).eps))
-
     with Engine(packing) as engine:
 
-        def run(dt: float) -> tuple[tuple[float, ...], int]:
-            """Errors of the rate that a run shows, as it is, and with the dispersion taken out; and its steps."""
+        def run(dt: float) -> tuple[list[float], int]:
+            """Errors of the rate that a run shows, as it is, and with the dispersion taken out, no less than the
+            rounding of a number; and its steps."""
             every = max(1, round(0.25 * np.pi / omega.real / dt))  # an eighth of a period
             engine.restore(engine.displace(packing, start))
             signal = []
@@ -149,15 +114,16 @@ def growth(settings: Settings) -> Study:
             b = np.array(signal)
             cosine = np.vdot(b[1:-1], b[2:] + b[:-2]) / (2 * np.vdot(b[1:-1], b[1:-1]).real)
             seen = np.arccos(cosine) / (every * dt)
-            return (off(seen), off(2 / dt * np.sin(0.5 * dt * seen))), int(time / dt)
+            off = (abs(2 * abs(each.imag) / exact - 1) for each in (seen, 2 / dt * np.sin(0.5 * dt * seen)))
+            return [max(each, float(np.finfo(float).eps)) for each in off], int(time / dt)
 
         steps = (limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])).tolist()
-        runs: list[Run[tuple[float, ...]]] = [(RUN, dt, partial(run, dt)) for dt in steps]
-        points, errors = timed(runs, settings, lambda errors: errors[0])
-    corrected = zip(points, errors, strict=True)
-    points += [point._replace(method=RUN_CORRECTED, error=both[1]) for point, both in list(corrected)]
-    noise = float(np.median([point.error for point in points if point.method == RUN_CORRECTED]))
+        points, errors = timed([(RUN, dt, partial(run, dt)) for dt in steps], settings, lambda errors: errors[0])
+    corrected = [
+        point._replace(method=RUN_CORRECTED, error=off) for point, (_, off) in zip(points, errors, strict=True)
+    ]
+    noise = float(np.median([point.error for point in corrected]))
     order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
     numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}
     numbers |= {"slower": 2 / limit / abs(omega), "resolution": resolution}
-    return study_of("growth", points, resolution, numbers, orders=[order])
+    return study_of("growth", points + corrected, resolution, numbers, orders=[order])

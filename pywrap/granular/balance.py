@@ -8,8 +8,7 @@ from ...analysis.counted import counted
 from .granular_commands import Commands, NotTakenError
 
 BALANCE = 1e-4
-"""Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
-says nothing of this motion."""
+"""Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest."""
 
 HELD_SPEED = 1e-12
 """Speed of a particle that nothing moves, in radii a time step, from which on its contacts are driven: in a million
@@ -53,8 +52,8 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
         "allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise NotTakenError(
-        f"The packing moves: the residual of {who} is "
-        f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
+        f"The packing moves: the residual of {who} is {size[worst] / force if force else np.inf:.3g} of the mean "
+        f"contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
 
@@ -63,12 +62,11 @@ def motion_remarks(
 ) -> tuple[str, ...]:
     """Sentences on velocities and rotations, shape (N, 3), which are zero in a packing at rest.
 
-    LAMMPS's contacts feel those of particles that no fix moves for ever, as `fix freeze` leaves them. Those of
-    particles that move are told if they are more than what forces out of balance make: v (k m)^(1/2) is a force, with
-    the largest entry k of K at a particle and its mass m. Their rotations do not count, as spheres may spin on a plane.
+    LAMMPS's contacts feel those of particles that no fix moves, as `fix freeze` leaves them. Those of particles that
+    move are told if v (k m)^(1/2), with the largest entry k of K at a particle, is more than a force that may be out of
+    balance. Their rotations do not count, as spheres may spin on a plane.
     """
-    c, says = configuration, []
-    speed = np.linalg.norm(velocity, axis=1)
+    c, says, speed = configuration, [], np.linalg.norm(velocity, axis=1)
     surface = np.maximum(speed, c.radius * np.linalg.norm(rotation, axis=1))
     drives = ~c.free & (surface * timestep > HELD_SPEED * c.radius)
     if count := int(drives.sum()):
@@ -103,11 +101,12 @@ def touch_twice(i: Indices, j: Indices) -> bool:
 
 def keeps_moving(commands: Commands) -> str:
     """What is said of a command that keeps particles from resting; empty if there is none."""
+    lines = " ".join(commands.pair)
     for name, line in commands.fixes.items():
         words = line.split()
         if words[3].startswith("langevin") and set(words[4:6]) - {"0", "0.0"}:
             return f"fix {name} langevin shakes the particles by its temperature: unfix it, or give it 0.0"
-    lines = " ".join([*commands.pair, *(line for line in commands.fixes.values() if "wall/gran" in line)])
+        lines += f" {line}" * words[3].startswith("wall/gran")
     for style in ("linear_nohistory", "gran/hooke", "wall/gran hooke"):
         if f" {style} " in lines:
             return (
@@ -122,13 +121,12 @@ def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floa
 
     Histories may be lost where friction can bear the residual force on the particle that has most, shape (N,).
     """
-    contacts = contacts.touching
-    pairs = contacts.i[~contacts.wall], contacts.j[~contacts.wall]
-    if says := keeps_moving(commands) or (TWICE if touch_twice(*pairs) else ""):
+    c = contacts.touching
+    if says := keeps_moving(commands) or (TWICE if touch_twice(c.i[~c.wall], c.j[~c.wall]) else ""):
         return says
-    has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
+    has_friction = (c.friction > 0) & np.isfinite(c.friction)  # infinite where no law is known
     if residual is not None:
-        at = (contacts.i == np.argmax(residual)) | (contacts.j == np.argmax(residual))
-        has_friction &= bool(contacts.friction[at].sum() >= residual.max())
-    lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
-    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""
+        at = (c.i == np.argmax(residual)) | (c.j == np.argmax(residual))
+        has_friction &= bool(c.friction[at].sum() >= residual.max())
+    lost = np.count_nonzero(has_friction & ~c.tangential_force.any(axis=1))
+    return f"{lost} of {len(c)} contacts {LOST}" if lost else ""

@@ -1,8 +1,7 @@
 r"""A Configuration whose contacts have the laws that LAMMPS shows.
 
-LAMMPS tells the normal, the overlap and both forces of each contact (compute pair/local, fix wall/gran ... contacts),
-without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). With the measured
-laws (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`)
+LAMMPS tells the normal, the overlap and both forces of each contact (:mod:`~faultgouge.pywrap.granular.looks`), without
+dashpots. With the measured laws (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`)
 
 .. math::
 
@@ -21,9 +20,8 @@ mindlin_rescale                        3/2    1/2    1/2            1
 mindlin_rescale/force                  3/2    1/2    0              1/2
 =====================================  =====  =====  =============  =============
 
-Hooke with a mindlin model, or hertz with linear_history, is as its parts. The wall of fix wall/gran hooke/history is as
-linear_history_classic in the release of 22 Jul 2025. A contact at Coulomb's bound sticks in K by default: what it does
-is for :mod:`~faultgouge.analysis.motion.one_sided`.
+The wall of fix wall/gran hooke/history is as linear_history_classic in the release of 22 Jul 2025. A contact at
+Coulomb's bound sticks in K: what it does is for :mod:`~faultgouge.analysis.motion.one_sided`.
 """
 
 from typing import Any, NamedTuple
@@ -38,22 +36,25 @@ from ...analysis.packing.linearise import linearise_contacts
 from .balance import known_cause
 from .contact_law_measurement import Law, State, measure_law
 from .granular_commands import GIVE_LINES, OWN, PLANES, Commands, NotLinearisedError, NotTakenError
-from .looks import Arrays, Looked, box_of, particles_of
+from .looks import Arrays, Looked, particles_of
 
 FORCE_AGREEMENT = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
 
 OVERLAP_ROUNDING = 1e-14
-"""Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
-may be ten times as large."""
+"""Rounding of an overlap, as a share of the distance of two centres, beside which coordinates may be ten times as
+large."""
+
+KnownLaws = dict[tuple[Any, ...], Law]
+"""By their commands, and the two types or the ID of a wall's fix."""
 
 
 class OneLaw(NamedTuple):
     """Contacts that have one law, as LAMMPS says them: between particles of two types, or with one wall.
 
-    `geometry` has the fields of LinearisedContacts that no law enters. `forces` has f_n and the vector f_t of LAMMPS's
-    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2). `rolling` has what LAMMPS says of rolling
-    friction, shape (C, 3): the force at the arm R of contacts between particles, and the whole torque of a wall.
+    `geometry` has the fields of LinearisedContacts that no law enters; `forces` f_n and the vector f_t of LAMMPS's own
+    styles, or the slip of ours, shape (C, 4); `rolling` the force of rolling friction at the arm R, or, of a wall, the
+    whole torque, shape (C, 3).
     """
 
     who: str
@@ -61,14 +62,10 @@ class OneLaw(NamedTuple):
     forces: Floats
     rolling: Floats
 
-    def chosen(self, which: NDArray[np.bool_], who: str = "") -> "OneLaw":
+    def chosen(self, which: NDArray[np.bool_], who: str) -> "OneLaw":
         """Some of the contacts."""
         geometry = {name: values[which] for name, values in self.geometry.items()}
-        return OneLaw(who or self.who, geometry, self.forces[which], self.rolling[which])
-
-
-KnownLaws = dict[tuple[Any, ...], Law]
-"""By their commands, and the two types or the ID of a wall's fix."""
+        return OneLaw(who, geometry, self.forces[which], self.rolling[which])
 
 
 def configuration_by_laws(lmp: Any, looked: Looked, laws: KnownLaws) -> Configuration:
@@ -89,47 +86,36 @@ def configuration_by_laws(lmp: Any, looked: Looked, laws: KnownLaws) -> Configur
     return derive_frozen(made, load=load)
 
 
-def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
-    """Refuse tangential forces beyond Coulomb's bound of the commands."""
-    size = np.linalg.norm(contacts.tangential_force, axis=1)
-    beyond = size > contacts.friction + FORCE_AGREEMENT * (contacts.friction + contacts.normal_force)
-    if np.any(beyond):
-        mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
-        moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
-        raise NotTakenError(
-            f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, with mu = {mu:.3g}: "
-            f"{moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
-        )
-
-
 def _linearised_contacts(
     lmp: Any, commands: Commands, found: Arrays, mass: Floats, laws: KnownLaws
 ) -> LinearisedContacts:
     """Contacts between particles, then those with each wall, then rolling friction. `mass` is what dashpots feel,
     infinite where frozen."""
-    pairs = contacts_of_pairs(found, box_of(lmp)[0])
-    walls = [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
-    at_walls = {name: _contacts_of_wall(found, name, commands.fixes[name]) for name in walls}
-    parts, couples = [], []
-    if commands.style == OWN:
-        parts.append(_linearise_smooth(commands.pair[0].split()[2:], pairs))
-        for name, contacts in at_walls.items():
-            words = commands.fixes[name].split()
-            parts.append(_linearise_smooth(words[4:7] + words[9:], contacts))
-    else:
-        groups: dict[Any, OneLaw] = _by_types(pairs, found["type"]) | at_walls
-        for name, every in groups.items():
-            # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
-            group = every.chosen(every.geometry["overlap"] > OVERLAP_ROUNDING * every.geometry["slip_arm"].sum(axis=1))
-            if len(group.forces) == 0:
-                continue
-            # laws belong to commands, which a user may change
-            key = (*commands.pair, commands.fixes.get(name), name)
-            if key not in laws:
-                laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
-            parts.append(_linearise_measured(laws[key], group, found, mass))
-            if laws[key]["mu_rolling"]:
-                couples.append(_linearise_rolling(laws[key], group, parts[-1], found, mass))
+    pairs, parts, couples = contacts_of_pairs(found), [], []
+    types = np.sort([found["type"][pairs.geometry["i"]], found["type"][pairs.geometry["j"]]], axis=0).T
+    groups: dict[Any, OneLaw] = {
+        (a, b): pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
+        for a, b in np.unique(types, axis=0).tolist()
+    }
+    for name in [name.removeprefix("wall ") for name in found if name.startswith("wall ")]:
+        groups[name] = _contacts_of_wall(found, name, commands.fixes[name])
+    for name, every in groups.items():
+        if commands.style == OWN:
+            words = commands.fixes[name].split() if name in commands.fixes else commands.pair[0].split()
+            parts.append(_linearise_smooth(words[4:7] + words[9:] if name in commands.fixes else words[2:], every))
+            continue
+        # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
+        touches = every.geometry["overlap"] > OVERLAP_ROUNDING * every.geometry["slip_arm"].sum(axis=1)
+        if not touches.any():
+            continue
+        group = every.chosen(touches, every.who)
+        # laws belong to commands, which a user may change; one line pair_coeff is one law for all types
+        key = (*commands.pair, commands.fixes.get(name), name if len(commands.pair) > 2 else None)
+        if key not in laws:
+            laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
+        sticks, rolls = _linearise_measured(laws[key], group, found, mass)
+        parts.append(sticks)
+        couples += [rolls] * (laws[key]["mu_rolling"] > 0)
     values = {}
     for name, shape in PER_CONTACT.items():
         kind = bool if name in BOOLEAN else np.int64 if name in ("i", "j") else np.float64
@@ -152,52 +138,45 @@ def _linearise_smooth(words: list[str], contacts: OneLaw) -> LinearisedContacts:
     return made
 
 
-def _linearise_measured(law: Law, contacts: OneLaw, found: Arrays, mass: Floats) -> LinearisedContacts:
-    """Contacts of a law that has been measured; `mass` as above."""
-    i, overlap, arms = (contacts.geometry[name] for name in ("i", "overlap", "slip_arm"))
-    normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
-    stiffness = (1 + law["stiffness"].overlap) * normal_force / overlap
-    reduced = _reduced(contacts, found, mass)
-    _agree(law["stiffness"].at(*reduced[:2]) * overlap, stiffness, contacts)
-    per_overlap = tangential_force / overlap[:, None]
-    return LinearisedContacts(
-        **contacts.geometry, lever_arm=np.where(arms > 0, arms - law["lever"] * overlap[:, None], 0.0),
-        lever_slope=np.full(len(i), law["lever"]), normal_force=normal_force, tangential_force=tangential_force,
-        normal_stiffness=stiffness, tangential_stiffness=law["tangential"].at(*reduced[:2]),
-        closing=law["closing"] * per_overlap, parting=law["parting"] * per_overlap, friction=law["mu"] * normal_force,
-        sliding=np.zeros(len(i), dtype=bool), normal_dashpot=law["normal_dashpot"].at(*reduced),
-        tangential_dashpot=law["tangential_dashpot"].at(*reduced),
-    )  # fmt: skip
-
-
-def _reduced(contacts: OneLaw, found: Arrays, mass: Floats) -> tuple[Floats, Floats, Floats]:
-    """Effective radii, overlaps and effective masses of contacts."""
-    i, j, radius = contacts.geometry["i"], contacts.geometry["j"], found["radius"]
-    wall = j == WALL
-    reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
+def _linearise_measured(
+    law: Law, contacts: OneLaw, found: Arrays, mass: Floats
+) -> tuple[LinearisedContacts, LinearisedContacts]:
+    """Contacts of a law that has been measured, and their rolling friction, whose torque on the first partner is
+    R n x f of LAMMPS's rolling force f; `mass` as above."""
+    i, j, overlap, arms, normal = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm", "normal"))
+    fn, ft, wall, none, zero = (
+        contacts.forces[:, 0],
+        contacts.forces[:, 1:],
+        j == WALL,
+        np.zeros_like(normal),
+        0.0 * overlap,
+    )
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
     inverse = 1 / mass[i] + 1 / mass[j]
-    reduced_mass = np.divide(1.0, inverse, out=np.zeros(len(i)), where=inverse > 0)
-    at_wall = np.where(np.isinf(mass), found["rmass"], mass)[i]
-    return reduced_radius, contacts.geometry["overlap"], np.where(wall, at_wall, reduced_mass)
-
-
-def _linearise_rolling(
-    law: Law, contacts: OneLaw, sticks: LinearisedContacts, found: Arrays, mass: Floats
-) -> LinearisedContacts:
-    """The rolling friction of contacts, whose torque on the first partner is R n x f of LAMMPS's rolling force f."""
-    radius, *reduced = _reduced(contacts, found, mass)
-    none, across = np.zeros((len(radius), 3)), np.cross(sticks.normal, sticks.tangential_force)
+    of_pair = np.divide(1.0, inverse, out=0.0 * inverse, where=inverse > 0)
+    of_state = (
+        np.where(wall, arms[:, 0], arms.prod(axis=1) / arms.sum(axis=1)),
+        overlap,
+        np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], of_pair),
+    )
+    stiffness, lever = (1 + law["stiffness"].overlap) * fn / overlap, law["lever"]
+    _agree(law["stiffness"].at(*of_state) * overlap, stiffness, contacts)
+    sticks = LinearisedContacts(
+        **contacts.geometry, lever_arm=np.where(arms > 0, arms - lever * overlap[:, None], 0.0),
+        lever_slope=lever + zero, normal_force=fn, tangential_force=ft, normal_stiffness=stiffness,
+        friction=law["mu"] * fn, sliding=np.zeros(len(i), dtype=bool), closing=law["closing"] * ft / overlap[:, None],
+        parting=law["parting"] * ft / overlap[:, None], tangential_stiffness=law["tangential"].at(*of_state),
+        normal_dashpot=law["normal_dashpot"].at(*of_state), tangential_dashpot=law["tangential_dashpot"].at(*of_state),
+    )  # fmt: skip
     # of a wall the whole torque is known; a frozen particle has none
-    by_wall = np.cross(sticks.normal, contacts.rolling + sticks.lever_arm[:, :1] * across) / radius[:, None]
+    radius = of_state[0][:, None]
+    by_wall = np.cross(normal, contacts.rolling + sticks.lever_arm[:, :1] * np.cross(normal, ft)) / radius
     by_wall[~np.any(contacts.rolling, axis=1)] = 0.0
-    force = np.where(sticks.wall[:, None], by_wall, -contacts.rolling)
-    arm = np.column_stack([radius, np.where(sticks.wall, 0.0, -radius)])
-    return derive_frozen(
-        sticks, couple=np.ones(len(radius), bool), tangential_force=force, slip_arm=arm, lever_arm=arm,
-        lever_slope=np.zeros(len(radius)), closing=none, parting=none, friction=law["mu_rolling"] * sticks.normal_force,
-        tangential_stiffness=law["rolling"].at(radius, *reduced),
-        tangential_dashpot=law["rolling_dashpot"].at(radius, *reduced),
+    arm = np.hstack([radius, np.where(wall[:, None], 0.0, -radius)])
+    return sticks, derive_frozen(
+        sticks, couple=np.ones(len(i), bool), tangential_force=np.where(wall[:, None], by_wall, -contacts.rolling),
+        slip_arm=arm, lever_arm=arm, lever_slope=zero, closing=none, parting=none, friction=law["mu_rolling"] * fn,
+        tangential_stiffness=law["rolling"].at(*of_state), tangential_dashpot=law["rolling_dashpot"].at(*of_state),
     )  # fmt: skip
 
 
@@ -217,9 +196,10 @@ def _geometry(
     return {"i": i, "j": j, "normal": normal, "distance": distance, "overlap": overlap, "slip_arm": arms}
 
 
-def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
+def contacts_of_pairs(found: Arrays) -> OneLaw:
     """All contacts between particles, of whatever types."""
-    rows = found["contacts"]
+    rows = np.zeros((len(found["contacts"]), 10))
+    rows[:, : found["contacts"].shape[1]] = found["contacts"]
     i, j = np.searchsorted(found["id"], found["partners"]).T
     if np.any(i == j):
         raise NotTakenError(
@@ -227,53 +207,38 @@ def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
         )
     # in LAMMPS of 2024 dx, dy and dz may point to the second of the partners
     branch, between = rows[:, :3], found["x"][i] - found["x"][j]
-    beside = [(between - sign * branch) @ np.linalg.inv(box) for sign in (1, -1)]
+    beside = [(between - sign * branch) @ np.linalg.inv(found["box"]) for sign in (1, -1)]
     right, wrong = (np.abs(each - np.round(each)).max(axis=1) for each in beside)
     branch = np.where((right <= wrong)[:, None], branch, -branch)
     distance = np.linalg.norm(branch, axis=1)
     overlap = found["radius"][i] + found["radius"][j] - distance
     geometry = _geometry(found, i, j, branch / distance[:, None], distance, overlap)
-    return OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:7], rows[:, 7:10])
-
-
-def _by_types(pairs: OneLaw, kind: Indices) -> dict[Any, OneLaw]:
-    """Contacts between particles by their two types, the smaller first."""
-    types = np.sort([kind[pairs.geometry["i"]], kind[pairs.geometry["j"]]], axis=0).T
-    return {
-        (a, b): pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
-        for a, b in np.unique(types, axis=0).tolist()
-    }
+    return OneLaw("contacts of pairs", geometry, rows[:, 3:7], rows[:, 7:10])
 
 
 def _contacts_of_wall(found: Arrays, name: str, line: str) -> OneLaw:
     """Contacts with the planes of fix wall/gran, of which LAMMPS has the nearer act, or with a floor of ours."""
     words, radius = line.split(), found["radius"]
-    if words[3] == "wall/mindlin/smooth":
-        axis, planes = 1, [words[8], "NULL"]
-    else:
-        at = next(k for k, word in enumerate(words) if word in PLANES)
-        axis, planes = PLANES.index(words[at]), words[at + 1 : at + 3]
-    x, (lower, upper) = found["x"][:, axis], (np.nan if word == "NULL" else float(word) for word in planes)
+    ours = words[3] == "wall/mindlin/smooth"
+    at = 7 if ours else next(k for k, word in enumerate(words) if word in PLANES)
+    axis, planes = (1, [words[8], "NULL"]) if ours else (PLANES.index(words[at]), words[at + 1 : at + 3])
+    lower, upper = (np.nan if word == "NULL" else float(word) for word in planes)
+    x = found["x"][:, axis]
     low, high = (np.nan_to_num(each, nan=np.inf) for each in (x - lower, upper - x))
     overlap = radius - np.minimum(low, high)
     i = np.flatnonzero((overlap > 0) & found[f"group {name}"])
-    normal, force, none = np.zeros((len(i), 3)), found[f"wall {name}"][i], np.zeros((len(radius), 3))
+    normal, force = np.zeros((len(i), 3)), found[f"wall {name}"][i]
     normal[:, axis] = np.where(low < high, 1.0, -1.0)[i]
-    if words[3] == "wall/mindlin/smooth":
-        forces = force[:, [0, 2]]
-    else:
-        along = np.einsum("ca,ca->c", force, normal)[:, None]
-        forces = np.hstack([along, force - along * normal])
+    along = np.einsum("ca,ca->c", force[:, :3], normal)[:, None]
+    forces = force[:, [0, 2]] if ours else np.hstack([along, force - along * normal])
     geometry = _geometry(found, i, np.full(len(i), WALL), normal, np.full(len(i), np.inf), overlap[i])
-    return OneLaw(f"contacts of fix {name}", geometry, forces, found.get(f"torque {name}", none)[i])
+    return OneLaw(f"contacts of fix {name}", geometry, forces, found.get(f"torque {name}", 0.0 * found["f"])[i])
 
 
 def _median_state(contacts: OneLaw, found: Arrays) -> State:
     """The contact of the median overlap, its partner of the smaller type first."""
     i, j, overlap = (contacts.geometry[name] for name in ("i", "j", "overlap"))
     k = np.argsort(overlap)[len(overlap) // 2]
-    radius, mass = found["radius"], found["rmass"]
-    if j[k] == WALL:
-        return State((radius[i[k]], 0.0), (mass[i[k]], np.inf), overlap[k])
-    first, second = sorted((i[k], j[k]), key=lambda each: found["type"][each])
-    return State((radius[first], radius[second]), (mass[first], mass[second]), overlap[k])
+    pair = [i[k]] if j[k] == WALL else sorted((i[k], j[k]), key=lambda each: found["type"][each])
+    radii, masses = (*found["radius"][pair], 0.0), (*found["rmass"][pair], np.inf)
+    return State(radii[:2], masses[:2], overlap[k])

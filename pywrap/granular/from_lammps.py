@@ -1,10 +1,8 @@
 """A Configuration of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
-Where all contacts have laws that can be measured, K and C are those of the laws
-(:mod:`~faultgouge.pywrap.granular.configuration_by_laws`). With other forces (cohesion, rolling and twisting friction,
-regions, bonds, springs, a lid that moves as one) K and C are differences of LAMMPS's own forces
-(:mod:`~faultgouge.pywrap.granular.configuration_by_differences`). A few of LAMMPS's own steps prove either
-(:mod:`~faultgouge.pywrap.granular.motion_proof`).
+Where all contacts have laws that can be measured, K and C are those of the laws. With other forces (cohesion, twisting
+friction, regions, bonds, springs) K and C are differences of LAMMPS's own forces. A few of LAMMPS's own steps prove
+either.
 """
 
 from collections.abc import Iterable
@@ -17,8 +15,8 @@ from ...analysis import Configuration
 from ...analysis.arrays import derive_frozen
 from .balance import BALANCE, check_balance, force_scale, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
-from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, without_suffix
+from .configuration_by_laws import FORCE_AGREEMENT, KnownLaws, configuration_by_laws
+from .granular_commands import GIVE_LINES, Commands, NotLinearisedError, NotTakenError, read_commands
 from .look_in_a_copy import DRAG_STYLES, in_a_copy, open_files, require_instance
 from .looks import Looked, acting_fixes, look, may_act
 from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError
@@ -50,9 +48,8 @@ def from_lammps(
         Residual that is allowed, as a share of the mean contact force; not negative.
     prove : bool
         Whether five steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
-        `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
-        1e-3 is refused, and 1e-5 or less is usual. `proof` is None for a packing whose residual exceeds the default
-        balance.
+        `proof` is their relative difference. A packing of more than 1e-3 is refused, and 1e-5 or less is usual. `proof`
+        is None for a packing whose residual exceeds the default balance.
     differences : bool
         Whether K and C are found by differences of LAMMPS's forces even where all laws of contacts are measured.
 
@@ -97,47 +94,42 @@ def take_configuration(
     try:
         if differences:
             raise NotLinearisedError("They are asked for.")
-        return _by_laws(lmp, given, laws, balance=balance, prove=prove)
+        looked = in_a_copy(partial(look, lmp, given, open_files()))
+        try:
+            found = configuration_by_laws(lmp, looked, laws)
+        except ValueError as error:  # numbers that no contact at rest has
+            advice = "bring it to rest by faultgouge.relax(lmp), in a command --relax"
+            raise NotTakenError(f"The packing moves: {str(error).rstrip('.')}; {advice}.") from error
+        rests = not found.residual > BALANCE * force_scale(found)
+        if not (prove and rests):  # no motion can show whether these act
+            held = {name: style for name, style in looked.fixes.items() if style.startswith(("spring", "indent"))}
+            if acts := acting_fixes(held, looked.commands):
+                raise NotLinearisedError(f"{may_act(acts)}.")
+        size, c = np.linalg.norm(found.contacts.tangential_force, axis=1), found.contacts
+        beyond = size > c.friction + FORCE_AGREEMENT * (c.friction + c.normal_force)
+        if np.any(beyond):
+            mu = np.min(c.friction[beyond] / c.normal_force[beyond])
+            moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
+            raise NotTakenError(
+                f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, with mu = "
+                f"{mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
+            )
+        return _at_rest(lmp, found, looked, balance=balance, prove=prove)
     except NotLinearisedError as error:
-        return _instead_of_laws(lmp, given, error, balance=balance, prove=prove)
-
-
-def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: float, prove: bool) -> Configuration:
-    """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
-    looked = in_a_copy(partial(look, lmp, given, open_files()))
-    try:
-        found = configuration_by_laws(lmp, looked, laws)
-    except ValueError as error:  # numbers that no contact at rest has
-        advice = "bring it to rest by faultgouge.relax(lmp), in a command --relax"
-        raise NotTakenError(f"The packing moves: {str(error).rstrip('.')}; {advice}.") from error
-    rests = not found.residual > BALANCE * force_scale(found)
-    if not (prove and rests):  # no motion can show whether these act
-        held = {name: style for name, style in looked.fixes.items() if style.startswith(("spring", "indent"))}
-        if acts := acting_fixes(held, looked.commands):
-            raise NotLinearisedError(f"{may_act(acts)}.")
-    check_friction(found.contacts, rests=rests)
-    return _at_rest(lmp, found, looked, balance=balance, prove=prove)
-
-
-def _instead_of_laws(
-    lmp: Any, given: Commands | None, reason: NotLinearisedError, *, balance: float, prove: bool
-) -> Configuration:
-    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
-    why = str(reason).rstrip(".")
+        reason = error
     unproved = reason if isinstance(reason, NotProvedError) else None
     try:
         start, looked = still_particles(lmp, given)
         found = _at_rest(lmp, configuration_by_differences(lmp, start, looked), looked, balance=balance, prove=prove)
-    except NotTakenError:
-        if unproved is None:
-            raise
-        raise unproved from None
+    except NotTakenError as error:
+        raise unproved or error from None
     # differences lack forces on velocities, or between particles far apart, too
     exact = found.proof is not None and found.proof <= LARGEST_DIFFERENCE and found.operator_error <= SMALL_DIFFERENCE
     # contacts that slide on one side have no linear motion, and no verdict is given
     if unproved is not None and not exact and not len(found.one_sided_particles):
         raise unproved
-    return derive_frozen(found, remarks=(f"K and C are differences of LAMMPS's forces: {why}", *found.remarks))
+    why = f"K and C are differences of LAMMPS's forces: {str(reason).rstrip('.')}"
+    return derive_frozen(found, remarks=(why, *found.remarks))
 
 
 def _at_rest(lmp: Any, made: Configuration, looked: Looked, *, balance: float, prove: bool) -> Configuration:
@@ -148,11 +140,11 @@ def _at_rest(lmp: Any, made: Configuration, looked: Looked, *, balance: float, p
         if style.startswith("adapt"):
             says = "may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
             remarks.append(f"fix {name} (adapt) {says}")
-        elif without_suffix(style).startswith(DRAG_STYLES):
+        elif style.startswith(DRAG_STYLES):
             remarks.append(f"drag of fix {name} ({style}) is left out")
     refuse_motion(made, balance, looked.commands)
     made = derive_frozen(made, remarks=tuple(remarks))
     if not prove or made.residual > BALANCE * force_scale(made):
         return made
     others = may_act(acting_fixes(looked.fixes, looked.commands))
-    return derive_frozen(made, proof=prove_motion(lmp, made, others, extrapolates=looked.commands.style == OWN))
+    return derive_frozen(made, proof=prove_motion(lmp, made, others))

@@ -1,19 +1,16 @@
 r"""The commands of a deck that say how particles interact and move.
 
-LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of its fixes. Of a deck that runs here, it
-tells each command as it carries it out (:mod:`~faultgouge.pywrap.granular.run_deck`). Of another instance, the log has
-the commands, with variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS
-understood it. What is printed stands there, too, and is left out: the output of `print`, and all that a run writes.
+LAMMPS hands out neither kn, kt and mu nor the words of its fixes. Of a deck that runs here, it tells each command as it
+carries it out. Of another instance, the log has the commands: one with a $ stands there twice, as it was written and
+as LAMMPS understood it. What `print` and a run write stands there, too, and is left out.
 
 Lists of styles say which laws can be measured and which coordinates move. Whether anything else acts on the particles
 is for :mod:`~faultgouge.pywrap.granular.motion_proof`.
 
-**What moves as one.** The particles of a lid that `fix aveforce` moves have common translations: q = P Q, with the
-lid's coordinates at its first particle. `fix aveforce` gives each particle the same force, so that
-:math:`m_i \ddot x_i = \frac1n \sum_k F_k`, and :math:`x_i = (m_1/m_i) X`: particles of different mass move by different
-amounts. The particles of a body of fix rigid that does not rotate have one displacement, and the force on the body is
-the sum of theirs. A component that `fix setforce` sets to zero, and whatever no fix moves, is held: its row of P is
-empty.
+**What moves as one.** q = P Q, with the coordinates of a lid at its first particle. `fix aveforce` gives each particle
+the same force, so that :math:`m_i \ddot x_i = \frac1n \sum_k F_k`, and :math:`x_i = (m_1/m_i) X`. The particles of a
+body of fix rigid that does not rotate have one displacement. A component that `fix setforce` sets to zero, and whatever
+no fix moves, is held: its row of P is empty.
 """
 
 import re
@@ -29,47 +26,38 @@ from ...analysis import FaultgougeError
 from ...analysis.arrays import Floats
 
 HISTORY = ("gran/hooke/history", "gran/hertz/history", "granular")
-"""LAMMPS's pair styles with a tangential history."""
-
 OWN = "mindlin/smooth"
+NORMAL = ("hooke", "hertz", "hertz/material")
+TANGENTIAL = (
+    "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
+    "mindlin_rescale/force",
+)  # fmt: skip
+"""Pair styles, and models of `granular`, with a tangential history."""
 
+PLANES = ("xplane", "yplane", "zplane")
 WALLS = ("wall/gran", "wall/mindlin/smooth")
-
 BODIES = ("rigid", "rigid/nve")
 """Fixes whose bodies may be kept from rotating."""
 
 TURNS = ("nve/sphere", "nve/disc", "overdamped/disc")
-"""Fixes that move particles and turn them."""
-
 MOBILE = (*TURNS, *BODIES, "nve", "nve/limit", "freeze", "setforce", "aveforce")
-"""Fixes that move or hold coordinates as is known here."""
+"""Fixes that move particles and turn them, and all that move or hold coordinates as is known here."""
 
 MOVES = ("nve", "rigid", "poems", "move", "overdamped", "nvt", "nph", "npt", "deform", "press/berendsen")
-"""Fixes that move particles or the box, by the beginnings of their styles."""
-
 HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce")
-"""Fixes that change forces of coordinates that are held, or that move as one."""
-
 CHANGES = (*MOVES, *HOLDS, "momentum", "temp/", "oneway", "recenter", "propel/self")
-"""Fixes with which no packing is taken, but for those that are known."""
+"""Beginnings of the styles of fixes that move particles or the box, that change forces of coordinates that are held or
+move as one, and with which no packing is taken, but for those that are known."""
 
 GIVE_LINES = (
     "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as "
     "from_lammps(lmp, commands=[...])"
 )
 
-NORMAL = ("hooke", "hertz", "hertz/material")
-TANGENTIAL = (
-    "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
-    "mindlin_rescale/force",
-)  # fmt: skip
-PLANES = ("xplane", "yplane", "zplane")
-
 PRINT = re.compile(r"""(?sm)^[ \t]*print[ \t]+(?:(?P<quote>\"{3}|["'])(?P<text>.*?)(?P=quote)|\S+)(?P<more>[^\n]*)\n""")
-"""The command `print` in a log. LAMMPS writes the text into the lines that follow."""
-
 RUN = re.compile(r"(?ms)^[ \t]*(?:(run|minimize|rerun)[ \t][^\n]*\n|Per MPI rank memory ).*?^Loop time of [^\n]*$")
-"""A run in a log, with all that is written meanwhile, by `fix print` among others."""
+"""The command `print` in a log, whose text LAMMPS writes into the lines that follow; and a run, with all that is
+written meanwhile, by `fix print` among others."""
 
 
 class NotTakenError(FaultgougeError):
@@ -93,29 +81,25 @@ class Commands:
         return without_suffix(self.pair[0].split()[1])
 
 
-def rolls(line: str) -> bool:
-    """Whether the contacts of a line have rolling friction, which only the style `granular` has."""
-    words = line.split()
-    return "rolling" in words and words[words.index("rolling") + 1 :][:1] != ["none"]
-
-
 def without_suffix(style: str) -> str:
     """A style as LAMMPS's manual names it."""
     return re.sub("/(omp|kk|intel|gpu|opt)$", "", style)
 
 
 def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Commands:
-    """Commands from the lines, or the text, of a log, or from some that a user gives.
-
-    Raises
-    ------
-    NotTakenError
-        If no line is a pair_style, or a line that a user gives has a variable in it.
-    """
+    """Commands from the lines, or the text, of a log, or from some that a user gives; a NotTakenError if no line is a
+    pair_style, or a line that a user gives has a variable in it."""
     if isinstance(lines, Commands):
         return lines
-    text = lines if isinstance(lines, str) else "\n".join(lines)
-    text = RUN.sub(r"\1", _without_prints(text)) if log else text
+    text = whole = lines if isinstance(lines, str) else "\n".join(lines)
+    if log:  # without the commands `print` and their output, which may read as a command, and without runs
+        text, at = "", 0
+        for each in PRINT.finditer(whole):
+            if each.start() >= at:
+                text, at = text + whole[at : each.start()], each.end()
+                for _ in range(0 if "screen no" in each["more"] else 1 + (each["text"] or "").count("\n")):
+                    at = whole.find("\n", at) + 1 or len(whole)
+        text = RUN.sub(r"\1", text + whole[at:])
     found = []
     for line in re.sub(r"&[ \t]*\n", " ", text).splitlines():
         words = line.split("#")[0].split()
@@ -127,25 +111,9 @@ def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Co
     return commands_of(found, "The log of this LAMMPS has" if log else "The commands have")
 
 
-def _without_prints(text: str) -> str:
-    """A log without the commands `print` and their output, which may read as a command."""
-    kept, at = "", 0
-    for each in PRINT.finditer(text):
-        if each.start() >= at:
-            kept, at = kept + text[at : each.start()], each.end()
-            for _ in range(0 if "screen no" in each["more"] else 1 + (each["text"] or "").count("\n")):
-                at = text.find("\n", at) + 1 or len(text)
-    return kept + text[at:]
-
-
 def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
-    """Commands that hold after those that LAMMPS has carried out, one after the other, in words; `source` has them.
-
-    Raises
-    ------
-    NotTakenError
-        If no pair_style is among them.
-    """
+    """Commands that hold after those that LAMMPS has carried out, one after the other, in words; `source` has them. A
+    NotTakenError if no pair_style is among them."""
     style = cleared = ""
     coefficients, fixes = dict[tuple[str, ...], str](), dict[str, str]()
     for words in carried_out:
@@ -167,89 +135,74 @@ def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
     return Commands((style, *(coefficients.values() or ["pair_coeff * *"])), fixes)
 
 
-def unmeasured_pair(commands: Commands) -> str:
-    """Why the laws of a pair style are not measured; empty if they are."""
-    if commands.style not in (*HISTORY, OWN):
-        return f"pair_style {commands.style} is none of {', '.join(HISTORY)} and {OWN}: use one of these."
-    models = commands.pair[1:] if commands.style == "granular" else ()
-    return next(filter(None, (_unmeasured_model(line.split()[3:], line) for line in models)), "")
-
-
-def _unmeasured_model(words: list[str], line: str) -> str:
-    """What a model of `granular` has beside normal, tangential and rolling forces with a history; empty if nothing."""
-    given = dict(zip(words, [*words[1:], ""], strict=True))
-    tangential = given.get("tangential", "none")
-    if others := [word for word in ("twisting", "heat") if given.get(word, "none") != "none"]:
-        return f"{line!r}: {others[0]} is not linearised here."
-    if words and words[0] not in NORMAL:
-        return f"{line!r}: {words[0]} is none of {', '.join(NORMAL)}."
-    if words and tangential not in TANGENTIAL:
-        return f"{line!r}: tangential {tangential} keeps no history; use {', '.join(TANGENTIAL)}."
-    return ""
-
-
-def check_fixes(styles: dict[str, str], commands: Commands) -> str:
+def check_fixes(styles: dict[str, str], commands: Commands) -> None:
     """Refuse fixes, by ID and style, with which no packing rests, or that move or hold particles in a way that is not
-    known. Why the laws of contacts with walls are not measured; empty if they are."""
-    unmeasured = ""
+    known."""
     for name, style in styles.items():
-        plain, line = without_suffix(style), commands.fixes.get(name, "")
-        if plain.startswith(CHANGES) and plain not in MOBILE:
+        line = commands.fixes.get(name, "").split()
+        if style.startswith(CHANGES) and style not in MOBILE:
             raise NotTakenError(
                 f"fix {name} {style} moves or holds particles, or changes velocities, in a way that is not known here: "
                 "unfix it, or use fix nve/sphere and fix setforce, and let the packing come to rest."
             )
-        if plain in (*WALLS, *MOBILE) and without_suffix(" ".join(line.split()[3:4])) != plain:
+        if style in (*WALLS, *MOBILE) and without_suffix(" ".join(line[3:4])) != style:
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINES}.")
-        if plain == "wall/gran":
-            unmeasured = unmeasured or _unmeasured_wall(name, line)
-        elif plain.startswith("wall/") and plain not in WALLS:
-            unmeasured = unmeasured or f"fix {name} {style} is not linearised here: use planes of fix wall/gran."
-    return unmeasured
+        at = place_of_wall(line)
+        if style == "wall/gran" and len(line) < at + (3 if line[at : at + 1] and line[at] in PLANES else 2):
+            raise NotTakenError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
 
 
-def _unmeasured_wall(name: str, line: str) -> str:
-    """Why the laws of a wall are not measured; empty if they are."""
-    words = line.split()
-    at = next((k for k, word in enumerate(words) if word in (*PLANES, "zcylinder", "region")), len(words))
-    if len(words) < at + (3 if at < len(words) and words[at] in PLANES else 2):
-        raise NotTakenError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
-    if words[at] not in PLANES or "temperature" in words:
-        return f"The wall of fix {name} is no plane without heat: use {', '.join(PLANES)}."
-    if words[4] == "hooke":
-        return f"fix {name} wall/gran hooke has no tangential history: use hooke/history."
-    return _unmeasured_model(words[5:at], line) if words[4] == "granular" else ""
+def place_of_wall(words: list[str]) -> int:
+    """At which word of a line fix wall/gran the place of the wall begins."""
+    return next((k for k, word in enumerate(words) if word in (*PLANES, "zcylinder", "region")), len(words))
 
 
+def unmeasured_laws(styles: dict[str, str], commands: Commands) -> str:
+    """Why the laws of the contacts of an instance are not measured; empty if they are."""
+    if commands.style not in (*HISTORY, OWN):
+        return f"pair_style {commands.style} is none of {', '.join(HISTORY)} and {OWN}: use one of these."
+    models = [(line, line.split()[3:]) for line in commands.pair[1:] if commands.style == "granular"]
+    for name, style in styles.items():
+        line = commands.fixes.get(name, "")
+        words = line.split()
+        if style == "wall/gran":
+            at = place_of_wall(words)
+            if words[at] not in PLANES or "temperature" in words:
+                return f"The wall of fix {name} is no plane without heat: use {', '.join(PLANES)}."
+            if words[4] == "hooke":
+                return f"fix {name} wall/gran hooke has no tangential history: use hooke/history."
+            models += [(line, words[5:at])] * (words[4] == "granular")
+        elif style.startswith("wall/") and style not in WALLS:
+            return f"fix {name} {style} is not linearised here: use planes of fix wall/gran."
+    for line, words in models:
+        given = dict(zip(words, [*words[1:], ""], strict=True))
+        if others := [word for word in ("twisting", "heat") if given.get(word, "none") != "none"]:
+            return f"{line!r}: {others[0]} is not linearised here."
+        if words and words[0] not in NORMAL:
+            return f"{line!r}: {words[0]} is none of {', '.join(NORMAL)}."
+        if words and given.get("tangential", "none") not in TANGENTIAL:
+            return f"{line!r}: tangential {given.get('tangential')} keeps no history; use {', '.join(TANGENTIAL)}."
+    return ""
+
+
+OF_BODIES = re.compile(r" (force|torque) (\d*)(\*?)(\d*) (\S+) (\S+) (\S+)")
 YES = ("on", "yes", "true")
 
 
 def translating_bodies(line: str, dimension: int) -> dict[str, NDArray[np.bool_]]:
-    """The groups of the bodies of a command fix rigid, and along which axes each translates, shape (3,).
-
-    Raises
-    ------
-    NotTakenError
-        If they may rotate, or the command has what is not known here.
-    """
+    """The groups of the bodies of a command fix rigid, and along which axes each translates, shape (3,); a
+    NotTakenError if they may rotate, or the command has what is not known here."""
     words = line.split()
     name, style, kind = words[1], words[3], words[4]
     groups = [words[2]] if kind == "single" else words[6 : 6 + int(words[5])] if kind == "group" else []
     axes, turns = np.ones((2, len(groups), 3), np.bool_)
-    at = 5 if kind == "single" else 6 + len(groups)
-    while groups and at < len(words):
-        if words[at] == "reinit" and words[at + 1] in YES:
-            at += 2
-            continue
-        if words[at] not in ("force", "torque"):
-            raise NotTakenError(
-                f"fix {name} {style} has {' '.join(words[at : at + 2])}, which is not known here: leave it out."
-            )
-        low, star, high = words[at + 1].partition("*")
+    more = re.sub(r" reinit (on|yes|true)\b", "", " ".join(["", *words[5 if kind == "single" else 6 + len(groups) :]]))
+    if groups and (unknown := OF_BODIES.sub("", more)):
+        raise NotTakenError(f"fix {name} {style} has{unknown}, which is not known here: leave it out.")
+    for what, low, star, high, *moves in OF_BODIES.findall(more):
         which = slice(int(low or 1) - 1, int(high or len(groups)) if star else int(low))
-        (axes if words[at] == "force" else turns)[which] = [word in YES for word in words[at + 2 : at + 5]]
-        at += 5
-    if without_suffix(style) not in BODIES or not groups or (turns if dimension == 3 else turns[:, 2:]).any():
+        (axes if what == "force" else turns)[which] = [word in YES for word in moves]
+    if not groups or (turns if dimension == 3 else turns[:, 2:]).any():
         raise NotTakenError(
             f"fix {name} {style} {kind} holds particles together in bodies that may rotate, and rotations of bodies "
             "are not linearised here: for lids that do not rotate use fix rigid single, or group, with `torque * off "
@@ -259,48 +212,27 @@ def translating_bodies(line: str, dimension: int) -> dict[str, NDArray[np.bool_]
 
 
 class Mobility(NamedTuple):
-    """P of q = P Q, square, and `needed` where it says more than which particles are free, shape (N,); I/(m R^2) of
-    each particle; and the mass that dashpots feel, of a body all of its own, infinite where frozen."""
+    """P of q = P Q, square, where it says more than which particles are free, shape (N,); I/(m R^2) of each particle;
+    and the mass that dashpots feel, of a body all of its own, infinite where frozen."""
 
-    constraint: csr_array
-    needed: csr_array | None
+    constraint: csr_array | None
     free: NDArray[np.bool_]
     factor: Floats
     felt_mass: Floats
 
 
 def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass: Floats, dimension: int) -> Mobility:
-    """The coordinates that the fixes move.
-
-    Parameters
-    ----------
-    lines : dict of str
-        The commands of the fixes by their IDs, in the order of the deck.
-    members : dict of ndarray of bool, shape (N,)
-        Who is in the group of each, and in those of the bodies of a fix rigid, by the ID and the group.
-    mass : ndarray, shape (N,)
-        Masses.
-    dimension : int
-        2 or 3.
-
-    Raises
-    ------
-    NotTakenError
-        If a fix moves or holds particles otherwise.
-    """
-    styles = {name: without_suffix(line.split()[3]) for name, line in lines.items()}
-    bodies = {name: translating_bodies(lines[name], dimension) for name, style in styles.items() if style in BODIES}
-    # fix rigid moves the particles of its bodies alone, whatever its own group is
-    inside = members | {
-        name: np.any([members[f"{name} {group}"] for group in each], axis=0) for name, each in bodies.items()
-    }
+    """The coordinates that the fixes move, whose commands are in the order of the deck; a NotTakenError if one moves or
+    holds particles otherwise. `members` are who is in the group of each, shape (N,), by the ID; and in those of the
+    bodies of a fix rigid, by the ID and the group."""
     # of each component of (translation, rotation): whether it moves, who leads it, and by how much
     moves, leader = np.zeros((6, len(mass)), np.bool_), np.tile(np.arange(len(mass)), (6, 1))
     weight, factor, felt = np.ones((6, len(mass))), np.full(len(mass), 0.4), np.array(mass)
+    styles = {name: without_suffix(line.split()[3]) for name, line in lines.items()}
     # forces are set after all integrators are known, whatever the order of the deck, and freeze comes last
     order = ("setforce", "aveforce", "freeze")
     for name in sorted(lines, key=lambda each: 1 + order.index(styles[each]) if styles[each] in order else 0):
-        style, words, here = styles[name], lines[name].split()[4:], inside[name]
+        style, words, here = styles[name], lines[name].split()[4:], members[name]
         if style in TURNS:
             moves[:, here] = True
             own = {"nve/disc": 0, "overdamped/disc": 1}.get(style)
@@ -309,10 +241,15 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
             moves[:3, here] = True
         elif style == "freeze":
             moves[:, here], felt[here] = False, np.inf
-        for group, along in bodies.get(name, {}).items():
-            body = members[f"{name} {group}"]
-            felt[body], moves[:3, body], leader[:3, body] = mass[body].sum(), along[:, None], np.flatnonzero(body)[:1]
-        for k, word in enumerate(words[:3] if style in ("setforce", "aveforce") else ()):
+        elif style in BODIES:  # it moves the particles of its bodies alone, whatever its own group is
+            for group, along in translating_bodies(lines[name], dimension).items():
+                body = members[f"{name} {group}"]
+                moves[:3, body], leader[:3, body], felt[body] = (
+                    along[:, None],
+                    np.flatnonzero(body)[:1],
+                    mass[body].sum(),
+                )
+        for k, word in enumerate(words[:3] if style in order[:2] else ()):
             if word == "NULL":
                 continue
             if "v_" in word or (style == "setforce" and float(word) != 0.0):
@@ -321,21 +258,18 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
                 )
             if style == "setforce":
                 moves[k, here] = False
-                continue
-            joined = np.flatnonzero(here & moves[k])
-            leader[k, joined], weight[k, joined] = joined[:1], mass[joined[:1]] / mass[joined]
+            else:
+                joined = np.flatnonzero(here & moves[k])
+                leader[k, joined], weight[k, joined] = joined[:1], mass[joined[:1]] / mass[joined]
     axes = np.arange(6) if dimension == 3 else np.array([0, 1, 5])
-    if not moves[axes].any():
+    free = moves[axes].any(axis=0)
+    if not free.any():
         raise NotTakenError(
             "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
             "them are free and what their moments of inertia are."
         )
     row = np.flatnonzero(moves[axes])
-    column = (leader[axes] + len(mass) * np.arange(len(axes))[:, None]).ravel()
-    size = len(axes) * len(mass)
-    constraint, free = (
-        csr_array((weight[axes].ravel()[row], (row, column[row])), shape=(size, size)),
-        moves[axes].any(0),
-    )
+    column = (leader[axes] + len(mass) * np.arange(len(axes))[:, None]).ravel()[row]
+    constraint = csr_array((weight[axes].ravel()[row], (row, column)), shape=2 * (len(axes) * len(mass),))
     plain = abs(constraint - diags_array(np.tile(free, len(axes)).astype(np.float64))).nnz == 0
-    return Mobility(constraint, None if plain else constraint, free, factor, felt)
+    return Mobility(None if plain else constraint, free, factor, felt)

@@ -1,7 +1,7 @@
 """Where a motion that grows ends: LAMMPS's own motion, once contacts have changed.
 
-LAMMPS starts from the stored or live state with a small random push, and without drag of its own. Its motion is looked
-at in windows in which linear motion grows by `FOLDS_OF_WINDOW` e-folds:
+LAMMPS starts with a small random push, and without drag of its own. Its motion is looked at in windows in which linear
+motion grows by `FOLDS_OF_WINDOW` e-folds:
 
 - it *flows* if the root of D passes `FLOWS_FROM` of the mean diameter: particles leave their neighbours;
 - it *vibrates* if D has stayed the same in `SAME_WINDOWS` windows; a packing that has come to rest counts as this;
@@ -10,6 +10,7 @@ at in windows in which linear motion grows by `FOLDS_OF_WINDOW` e-folds:
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,29 +21,20 @@ from ...analysis.progress import report_progress
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import in_a_copy, quieten, require_instance
 
-STEP_SHARE = 0.1
-"""Time step, as a share of the largest stable one."""
+STEP_SHARE, PUSH_OVER_CHANGE = 0.1, 0.1
+"""Time step, as a share of the largest stable one; and displacement by the push, as a share of that at which the first
+contact changes."""
 
-PUSH_OVER_CHANGE = 0.1
-"""Displacement by the push, as a share of that at which the first contact changes."""
-
-FOLDS_OF_WINDOW = 6.0
-"""Growth of D in a window, in e-folds, as long as the motion is linear."""
-
-LOOKS_OF_WINDOW = 60
-"""Displacements that a window has."""
-
-LEAST_WINDOW = 300.0
-"""Length of a window in stable time steps, at the least: ten periods of a slow mode."""
+FOLDS_OF_WINDOW, LOOKS_OF_WINDOW, LEAST_WINDOW = 6.0, 60, 300.0
+"""Growth of D in a window, in e-folds, as long as the motion is linear; displacements that a window has; and its length
+in stable time steps, at the least: ten periods of a slow mode."""
 
 MOST_STEPS_OF_END = 4_000_000
 """Time steps that are followed: some minutes for fifty particles."""
 
-SAME_WINDOWS, SAME_SHARE = 4, 0.15
-"""Windows whose largest D differ by less than this share, of a motion that goes on as it is."""
-
-FLOWS_FROM = 0.1
-"""Root of D over the mean diameter."""
+SAME_WINDOWS, SAME_SHARE, FLOWS_FROM = 4, 0.15, 0.1
+"""Windows whose largest D differ by less than this share, of a motion that goes on as it is; and the root of D over the
+mean diameter from which on it flows."""
 
 NO_LAMMPS = (
     "what LAMMPS does then is not followed: this packing has no LAMMPS behind it; give a run.h5, or a deck "
@@ -54,26 +46,23 @@ NO_LAMMPS = (
 def follow_by(packing: Any, lmp: Any = None) -> Callable[[Stability], Stability]:
     """What adds to a verdict where the motion that grows ends: `Stability.follow`.
 
-    Parameters
-    ----------
-    packing : Packing or Configuration
-        A Packing is moved by the plugin.
-    lmp : lammps.lammps, optional
-        The instance of which a Configuration was taken; it moves in a copy of the process, and stays as it is.
+    The plugin moves a Packing. A Configuration needs the instance `lmp` of which it was taken, which moves in a copy of
+    the process, and stays as it is.
     """
 
+    c = packing.configuration
+
+    def in_lammps(told: Stability, step: float) -> dict[str, Any]:
+        lmp.command("log none")
+        quieten(lmp, drag=True)
+        lmp.command(f"timestep {step:.17g}")
+        return _ends(told, c, lmp, step)
+
     def follow(told: Stability) -> Stability:
-        c, step = packing.configuration, STEP_SHARE * float(stable_timestep(packing))
+        step = STEP_SHARE * float(stable_timestep(packing))
         if lmp is not None:
             require_instance(lmp, "stability")
-
-            def in_lammps() -> dict[str, Any]:
-                lmp.command("log none")
-                quieten(lmp, drag=True)
-                lmp.command(f"timestep {step:.17g}")
-                return _ends(told, c, lmp, step)
-
-            return replace(told, follow=in_a_copy(in_lammps))
+            return replace(told, follow=in_a_copy(partial(in_lammps, told, step)))
         if packing is c:
             return replace(told, remarks=(*told.remarks, NO_LAMMPS))
         from mpi4py import MPI

@@ -56,11 +56,8 @@ def has_bodies(lmp: Any) -> bool:
 
 
 def set_up_run(lmp: Any) -> None:
-    """Set up a run, which goes on without a set-up of its own.
-
-    At a set-up fix rigid does not know what later fixes add to the forces, and pushes its bodies in the first step: in
-    this step nothing moves.
-    """
+    """Set up a run, which goes on without a set-up of its own. At a set-up fix rigid does not know what later fixes add
+    to the forces, and pushes its bodies in the first step: in this step nothing moves."""
     if not has_bodies(lmp):
         lmp.command("run 0 post no")
         return

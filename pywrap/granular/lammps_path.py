@@ -1,20 +1,14 @@
 """The loading path of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
 
 An equilibrium from which the path goes on is a copy of the process (`fork`), which waits with LAMMPS in it. So contact
-histories are kept to the bit, as no restart file of LAMMPS can keep them. The instance of the user stays as it was. Of
-many copies most are ended: an equilibrium whose copy is asked for again is reached once more, by the same loads from
-the copy before, and is the same to the bit.
-
-**Relaxation.** The load jumps, and a drag takes the energy that the jump sets free. Motion ends soonest at the critical
-damping of the slowest mode, where the force out of balance is half of the drag. So the rate of the drag is doubled
-where the force is more than twice the drag. The rate is halved where the force is less than a quarter of the drag,
-since the packing then creeps, or a loose sphere rolls away.
+histories are kept to the bit, as no restart file of LAMMPS can keep them, and the instance of the user stays as it was.
+Of many copies most are ended: an equilibrium whose copy is asked for again is reached once more, by the same loads from
+the copy before.
 """
 
 import os
 import shutil
 import signal
-import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -76,20 +70,14 @@ def lammps_path(
     apply : callable or str
         ``apply(lmp, value)`` sets the load, whatever was set before; or the name of a variable of style equal or
         internal, on which a fix of the deck depends.
-    commands : iterable of str, optional
-        As of :func:`~faultgouge.pywrap.from_lammps`.
-    balance : float
-        Largest residual at rest, as a share of the mean contact force; not negative.
-    steps : int
-        Time steps after which a packing that is not at rest flows.
+    commands, balance, steps
+        As of `relax`.
 
     Raises
     ------
     NotTakenError
         If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
         the first value alone, and where a load changes no force.
-    BadInputError
-        If `balance` is no such number.
     NoEquilibriumError
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
@@ -103,42 +91,48 @@ def lammps_path(
 
 @dataclass(eq=False)
 class RelaxedCopy:
-    """An equilibrium, and the copy of the process that is there, if it still waits."""
+    """An equilibrium at a load, and the copy of the process that is there, if it still waits."""
 
+    fx: float
     packing: Configuration
     process: Connection | None
-
-    @property
-    def fx(self) -> float:
-        """The load."""
-        return self.packing.fx
 
 
 class CopiesSolver:
     """LAMMPS's own equilibria, each in a copy of the process; `close` or the end of the program ends the copies."""
 
     def __init__(self, relaxation: "_Relaxation") -> None:
-        folder = TemporaryDirectory(prefix="faultgouge")
+        self._folder = TemporaryDirectory(prefix="faultgouge")
         self._first, there = Pipe()
         self._ahead: list[RelaxedCopy] = []
         files = open_files()
         with interrupts_wait():
-            first = silent_copy()
-            if first == 0:
+            self._child = silent_copy()
+            if self._child == 0:
                 self._first.close()
-                _wait_for_loads(relaxation, there, Path(folder.name), files)
-            self._end = weakref.finalize(self, _end, self._first, self._ahead, first, os.getpid(), folder)
+                _wait_for_loads(relaxation, there, Path(self._folder.name), files)
         there.close()
+
+    def close(self) -> None:
+        """End all copies of the process."""
+        if self._first.closed:
+            return
+        for copy in filter(None, (self._first, *(each.process for each in self._ahead))):
+            with suppress(OSError):
+                copy.send(None)  # another copy of this process may keep the connection open
+            copy.close()
+        os.waitpid(self._child, 0)
+        self._folder.cleanup()
 
     def solve(self, load: float, below: RelaxedCopy | None, beside: RelaxedCopy | None, ahead: bool) -> RelaxedCopy:
         """As of :class:`~faultgouge.pywrap.load_path.LoadPath`: only a copy that is `ahead` waits for more."""
-        if not self._end.alive:
+        if self._first.closed:
             raise NotTakenError("The path is closed: ask it inside of its `with` block, or make a new one.")
         here, found = _ask(self._process_of(below), load)
         if isinstance(found, FaultgougeError):
             here.close()
             raise found
-        made = RelaxedCopy(found, here)
+        made = RelaxedCopy(load, found, here)
         if ahead:
             self._ahead.append(made)
             self._end_some(made)
@@ -164,10 +158,6 @@ class CopiesSolver:
                 each.process.close()
                 each.process = None
 
-    def close(self) -> None:
-        """End all copies of the process."""
-        self._end()
-
 
 def _ask(there: Connection, value: float) -> tuple[Connection, Any]:
     """Have a copy of the process copy itself and go to a load; the new copy, and what it finds."""
@@ -186,20 +176,6 @@ def _ask(there: Connection, value: float) -> tuple[Connection, Any]:
         raise
     except EOFError:
         return here, NotTakenError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
-
-
-def _end(
-    begin: Connection, ahead: list[RelaxedCopy], first: int, owner: int, folder: "TemporaryDirectory[str]"
-) -> None:
-    """End the copies of this process, which have this solver, too, and must not end it."""
-    if os.getpid() != owner:
-        return
-    for copy in (begin, *(each.process for each in ahead if each.process is not None)):
-        with suppress(OSError):
-            copy.send(None)  # another copy of this process may keep the connection open
-        copy.close()
-    os.waitpid(first, 0)
-    folder.cleanup()
 
 
 def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, files: dict[int, OpenFile]) -> NoReturn:
@@ -233,14 +209,13 @@ def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
     if before := log_file(lmp, files):
         own = folder / f"log.{os.getpid()}"
-        shutil.copyfile(before.path, own)
+        shutil.copyfile(before[0], own)
         lmp.command(f'log "{own}" append')
 
 
 @dataclass
 class _Relaxation:
-    """LAMMPS and how it comes to rest; `look` takes the packing as it stands, and the other fields are as of
-    `lammps_path`, and what copies of this process have, too."""
+    """LAMMPS and how it comes to rest; `look` takes the packing as it stands."""
 
     lmp: Any
     apply: Callable[[Any, float], object] | str
@@ -281,8 +256,8 @@ class _Relaxation:
             except FaultgougeError:
                 raise
             except (Exception, SystemExit) as error:  # of whatever kind: the function is the user's
-                of_lammps = str(error).startswith("ERROR")
-                what = explain_error(error) if of_lammps else f"apply failed with {type(error).__name__}: {error}"
+                failed = f"apply failed with {type(error).__name__}: {error}"
+                what = explain_error(error) if str(error).startswith("ERROR") else failed
                 raise NotTakenError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")

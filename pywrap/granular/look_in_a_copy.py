@@ -1,12 +1,11 @@
 """A LAMMPS instance of a user: its styles and its log, and looks in a copy of the process (`fork`).
 
-LAMMPS hands out contacts only in a run. A run of zero steps sorts particles, may cut a history once more at Coulomb's
-bound, and scales rescaled histories. In a copy of the process all of this may happen: the instance itself stays as it
-is. Several ranks, and threads, cannot be copied.
+LAMMPS hands out contacts only in a run, and a run of zero steps changes histories. In a copy of the process it may: the
+instance itself stays as it is. Several ranks, and threads, cannot be copied.
 
-**Files.** The copy shares open files with the process, with the positions at which they are written. So the copy first
-puts the null device in the place of every file that is open for writing, whoever has opened the file. All that LAMMPS,
-zlib or Python write as they close a dump or a log then goes nowhere.
+The copy shares open files with the process, with the positions at which they are written. So the copy first puts the
+null device in the place of every file that is open for writing, whoever has opened the file: all that LAMMPS, zlib or
+Python write as they close a dump or a log then goes nowhere.
 """
 
 import ctypes
@@ -21,23 +20,20 @@ from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from mpi4py import MPI
 
 from ...parent_death import end_with
-from .granular_commands import NotTakenError
+from .granular_commands import NotTakenError, without_suffix
 
 Found = TypeVar("Found")
 
 PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "record")
-"""Fixes that write or change something in a run, whatever moves, by the beginnings of their styles."""
-
 INSERTS = ("pour", "deposit", "evaporate")
-"""Fixes that put particles in or take them out, with which no time step may be changed."""
-
 DRAG_STYLES = ("viscous", "langevin", "overdamped", "damping/cundall")
-"""Fixes that take energy away, and may shake."""
+"""Beginnings of the styles of fixes that write or change something in a run, whatever moves; that put particles in or
+take them out, with which no time step may be changed; and that take energy away, and may shake."""
 
 
 def require_instance(lmp: Any, caller: str) -> None:
@@ -52,7 +48,7 @@ def require_instance(lmp: Any, caller: str) -> None:
 
 
 class Styles(NamedTuple):
-    """Pair style, styles and groups of the fixes by ID, and atom style of an instance."""
+    """Pair style, styles and groups of the fixes by ID, without the suffix of an accelerator, and atom style."""
 
     pair: str
     fixes: dict[str, str]
@@ -63,13 +59,13 @@ class Styles(NamedTuple):
 def styles_of(lmp: Any) -> Styles:
     """The styles of an instance, as LAMMPS's `info` says them on all ranks."""
     with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
-        lmp.command(f'info fixes system out overwrite "{name_of(answer)}"')
+        lmp.command(f"info fixes system out overwrite /dev/fd/{answer.fileno()}")
         info = MPI.COMM_WORLD.bcast(answer.read(), root=0)
     fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", info, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", info, re.MULTILINE))
-    # Atoms = N, types = T, style = the pair style
-    styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
-    return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
+    pair = without_suffix(values["Atoms"].rpartition("style = ")[2])  # Atoms = N, types = T, style = the pair style
+    styles, groups = {name: without_suffix(style) for name, style, _ in fixes}, {name: each for name, _, each in fixes}
+    return Styles(pair, styles, groups, values["Atom style"])
 
 
 def of_lammps(error: BaseException) -> bool:
@@ -84,58 +80,32 @@ def explain_error(error: BaseException) -> str:
     return f"LAMMPS stopped: {reason.rstrip('.')}."
 
 
-def name_of(file: IO[Any]) -> str:
-    """A name by which LAMMPS opens a nameless file of this process, which no end of the process can leave behind."""
-    return f"/dev/fd/{file.fileno()}"
-
-
-class OpenFile(NamedTuple):
-    """A file that this process has open for writing, and the place in it that is written next."""
-
-    path: str
-    place: int
+OpenFile = tuple[str, int]
+"""A file that this process has open for writing, and the place in it that is written next."""
 
 
 def open_files() -> dict[int, OpenFile]:
     """Files that are open for writing, by their descriptors, where the system has a folder /proc."""
     ctypes.CDLL(None).fflush(None)
-    found, listed = {}, Path("/proc/self/fd")
-    for each in listed.iterdir() if listed.is_dir() else ():
+    found = {}
+    for each in Path("/proc/self/fd").glob("*"):
         with suppress(OSError):
-            path = os.readlink(each)
-            if path.startswith("/") and os.path.isfile(path):
-                _, place, _, flags, *_ = Path(f"/proc/self/fdinfo/{each.name}").read_text().split()
-                if int(flags, 8) & os.O_ACCMODE != os.O_RDONLY:
-                    found[int(each.name)] = OpenFile(path, int(place))
+            path, facts = os.readlink(each), Path(f"/proc/self/fdinfo/{each.name}").read_text().split()
+            if os.path.isfile(path) and int(facts[3], 8) & os.O_ACCMODE != os.O_RDONLY:
+                found[int(each.name)] = path, int(facts[1])
     return found
 
 
 def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
-    """An instance's log among files that were open, which is closed by the question; None without a log.
-
-    A copy of the process asks with the open files of the process itself.
-    """
+    """The log of an instance that is a copy, among the open files of the process itself; the question closes it."""
     lmp.command("log none")  # a log of the command `log` does not begin as others do
     closed = [file for descriptor, file in files.items() if not Path(f"/proc/self/fd/{descriptor}").exists()]
     return closed[0] if len(closed) == 1 else None
 
 
-def text_of(log: OpenFile) -> str:
-    """The text of a log; a NotTakenError where another LAMMPS writes to the same file."""
-    text = Path(log.path).read_text(errors="replace")
-    if "\0" in text or os.path.getsize(log.path) != log.place:
-        raise NotTakenError(
-            f"{log.path} is the log of another LAMMPS, too: give each LAMMPS a log of its own (-log FILE), or the "
-            f"lines as from_lammps(lmp, commands=[...])."
-        )
-    return text
-
-
 def silent_copy(*keep: int) -> int:
-    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0.
-
-    The process decides what Ctrl-C ends: call this where :func:`interrupts_wait`.
-    """
+    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0. The
+    process decides what Ctrl-C ends: call this where :func:`interrupts_wait`."""
     ctypes.CDLL(None).fflush(None)  # buffered text would be written twice
     child = os.fork()
     if child:
@@ -156,17 +126,11 @@ def silent_copy(*keep: int) -> int:
 
 
 def in_a_copy(work: Callable[[], Found]) -> Found:
-    """The result of some work in a copy of this process. All traces of the work end with the copy, and an interrupt of
-    this process ends the copy, too.
-
-    Raises
-    ------
-    NotTakenError
-        With what went wrong in the copy.
-    """
+    """The result of some work in a copy of this process, or the error that it raises there, of LAMMPS as a
+    NotTakenError. All traces of the work end with the copy, and an interrupt of this process ends the copy, too."""
     here, there = Pipe(duplex=False)
     this, child = os.getpid(), 0
-    found: Any
+    found: Any = NotTakenError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
     try:
         with interrupts_wait():
             child = silent_copy(there.fileno())
@@ -179,14 +143,13 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
                 finally:
                     os._exit(0)
         there.close()
-        found = here.recv()
-    except EOFError:
-        found = NotTakenError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
+        with suppress(EOFError):
+            found = here.recv()
     finally:
         here.close()
         if child:
             with suppress(ProcessLookupError):
-                os.kill(child, signal.SIGKILL)  # it has sent all that it has to say, unless there was an interrupt
+                os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
     if isinstance(found, Exception):
         raise found

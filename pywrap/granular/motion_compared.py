@@ -7,8 +7,7 @@ From rest with the velocities :math:`\mathbf v_0` small motion is
 
 LAMMPS runs twice, with :math:`\pm \mathbf v_0`. Half of the difference has neither the motion by residual forces nor
 terms of second order in :math:`\mathbf v_0`. Left are the error of the time step h, of the order h^2, or h with
-dashpots; cubic terms of the forces; and, in `granular`, a history that is turned only once it has left the contact's
-plane by 1e-10 of Coulomb's bound. At the best amplitude the last two together are 1e-7 to 1e-5.
+dashpots; cubic terms of the forces; and, in `granular`, histories that are turned only beyond 1e-10 of Coulomb's bound.
 
 Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
 K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`,
@@ -21,8 +20,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_array, csr_array, diags_array
-from scipy.sparse.linalg import expm_multiply
+from scipy.integrate import solve_ivp
+from scipy.sparse import csr_array, diags_array
 
 from ...analysis import BadInputError, Configuration, damping_matrix, largest_frequency, stiffness_matrix
 from ...analysis.arrays import Floats, Indices
@@ -33,7 +32,7 @@ from .look_in_a_copy import require_instance
 from .motion_proof import steps_in_a_copy
 
 STEP_ERROR = 1e-10
-"""Error of a step in the motion with two derivatives, as a share of the largest velocity."""
+"""Error of a step of the linear motion, as a share of the largest velocity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +42,11 @@ class MotionComparison:
     Attributes
     ----------
     difference : float
-        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing, with the root of the masses.
-    time, timestep : float
-        The time, a whole number of steps, and the step.
+        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing.
+    time, timestep, periods : float
+        The time, a whole number of steps; the step; and how many periods of the fastest undamped vibration it has.
     velocity, linear_velocity : ndarray, shape (E,)
-        Velocities of LAMMPS and of the linearised packing, times the root of the masses, of the coordinates that feel
-        a force.
-    periods : float
-        How many periods of the fastest vibration without dashpots the time has. A time far below one compares the
-        acceleration alone; slow vibrations are compared over a share of a period.
+        v and u, times the root of the masses, of the coordinates that feel a force.
     """
 
     difference: float
@@ -60,9 +55,6 @@ class MotionComparison:
     velocity: Floats
     linear_velocity: Floats
     periods: float
-
-    def __float__(self) -> float:
-        return self.difference
 
     def __str__(self) -> str:
         return (
@@ -89,7 +81,7 @@ def compare_motion(
     lmp : lammps.lammps
         The instance, as it was when the configuration was taken; on one rank.
     configuration : Configuration
-        Of :func:`~faultgouge.pywrap.from_lammps`.
+        As `from_lammps` took it.
     time : float
         How long, positive.
     amplitude : float
@@ -103,15 +95,14 @@ def compare_motion(
     Returns
     -------
     MotionComparison
-        `difference` is the relative difference; it is also the value of ``float(...)``.
+        `difference` is the relative difference.
 
     Raises
     ------
     NotTakenError
-        If the instance has several ranks or threads, or other particles than the configuration, or none of these feels
-        a force.
+        If the instance has several ranks or threads, or other particles, or none of these feels a force.
     BadInputError
-        If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
+        If a time, the step or the amplitude is not positive and finite.
     """
     require_instance(lmp, "compare_motion")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
@@ -119,8 +110,7 @@ def compare_motion(
         if not 0 < value < np.inf:
             raise BadInputError(f"{name} = {value:g} is refused: nothing would be compared; give a number above 0.")
     steps = max(1, round(time / step))
-    stiffness = mass_weighted(stiffness_matrix(configuration), configuration)
-    active = active_coordinates(stiffness)
+    active = active_coordinates(mass_weighted(stiffness_matrix(configuration), configuration))
     if not len(active):
         raise NotTakenError("Nothing that moves has a contact: there is no motion to compare with.")
     root = np.sqrt(configuration.coordinate_mass)
@@ -128,38 +118,29 @@ def compare_motion(
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
     there, back = (steps_in_a_copy(lmp, configuration, sign * start, step, steps) for sign in (1, -1))
     velocity = (0.5 * (there - back) * root)[active]
-    linear = _linear_velocity(configuration, stiffness, active, (start * root)[active], step * steps)
+    linear = _linear_velocity(configuration, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
     periods = step * steps * largest_frequency(configuration) / (2 * np.pi)
     return MotionComparison(difference, step * steps, step, velocity, linear, periods)
 
 
-def _linear_velocity(
-    configuration: Configuration, stiffness: csr_array, active: Indices, start: Floats, time: float
-) -> Floats:
-    """Velocities after some time; these and `start` are multiplied by the root of the masses."""
-    a = stiffness[active][:, active]
-    g = mass_weighted(damping_matrix(configuration), configuration)[active][:, active]
-    # of (forces / omega, velocities), so that both halves weigh as much
-    omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
-    still = np.zeros_like(start)
-    system = csr_array(block_array([[None, -a / omega], [omega * diags_array(np.ones(len(start))), -g]]))
-    rates, forces = rescaling_operators(configuration)
-    if not forces.data.any():
-        return np.asarray(expm_multiply(time * system, np.concatenate([still, start])))[len(start) :]
-    from scipy.integrate import solve_ivp
-
-    weight = diags_array(1.0 / np.sqrt(configuration.coordinate_mass[active]))
-    n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active] / omega)
+def _linear_velocity(c: Configuration, active: Indices, start: Floats, time: float) -> Floats:
+    """Velocities after some time, half of the difference of both signs; these and `start` are multiplied by the root of
+    the masses."""
+    k, d = (mass_weighted(each, c)[active][:, active] for each in (stiffness_matrix(c), damping_matrix(c)))
+    weight, (rates, forces) = diags_array(1.0 / np.sqrt(c.coordinate_mass[active])), rescaling_operators(c)
+    n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
+    omega = float(np.sqrt(np.abs(k).sum(axis=1).max()))  # forces over it weigh as much as velocities
 
     def slope(_: float, state: Floats) -> Floats:
         """Each contact has its own derivative."""
-        return np.asarray(system @ state + np.concatenate([b @ np.abs(n @ state[len(start) :]), still]))
+        force, velocity = np.split(state, 2)
+        return np.concatenate([(b @ np.abs(n @ velocity) - k @ velocity) / omega, omega * force - d @ velocity])
 
-    ends = []
-    for sign in (1, -1):
-        begin, error = np.concatenate([still, sign * start]), STEP_ERROR * np.abs(start).max()
-        found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=STEP_ERROR, atol=error)
+    ends, error = [], STEP_ERROR * np.abs(start).max()
+    for begin in (start, -start):
+        state = np.concatenate([0.0 * begin, begin])
+        found = solve_ivp(slope, (0, time), state, method="DOP853", t_eval=[time], rtol=STEP_ERROR, atol=error)
         if not found.success:
             raise NotTakenError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
         ends.append(found.y[len(start) :, 0])

@@ -1,27 +1,20 @@
 r"""The proof of a Configuration: a few steps of LAMMPS beside the same steps of the linearised packing.
 
-LAMMPS starts from small random velocities, in a copy of the process, without drag and without what writes. The
-linearised packing starts from the same velocities, with the residual forces, and takes LAMMPS's own steps of velocity
-Verlet (:func:`linear_motion`). So the comparison has no error of the time step, and the step may be as long as a stable
-one. Dashpots feel the velocities of half steps in LAMMPS's styles, and extrapolated velocities in mindlin/smooth.
+LAMMPS starts from small random velocities, in a copy of the process, without drag. The linearised packing takes the
+same steps of velocity Verlet, with the residual forces: the comparison has no error of the time step. Dashpots feel the
+velocities of half steps in LAMMPS's styles, and extrapolated velocities in mindlin/smooth.
 
 **The proof** is :math:`|\Delta v - \Delta u| / |\Delta u|`, weighted with the root of the masses, with the changes of
-the velocities v of LAMMPS and u of the linearised packing. One motion is compared first. If its difference is not
-small, the motions with both signs of the velocities are compared: half of their difference has no terms of second order
-in the amplitude. With contacts at the bound the motions of both signs are not opposite. Then each is compared by
-itself, after the motion from rest has been subtracted. Shorter steps are taken where a model acts one step late (mdr),
-or takes the slip by other velocities (synchronized_verlet): the difference then falls as the step.
+the velocities v of LAMMPS and u of the linearised packing. Where one motion leaves a difference, those with both signs
+of the velocities are compared: half of their difference has no terms of second order. With contacts at the bound they
+are not opposite, and each is compared after the motion from rest has been subtracted. Shorter steps are taken where a
+model acts one step late (mdr, synchronized_verlet). K by differences of one-sided forces is a mean of both sides: the
+difference is told, and the packing is not refused.
 
-**K by differences of forces** has no contacts at the bound. If forces are one-sided, K is the mean of both sides,
-and no linear motion is LAMMPS's: the difference is told, and the packing is not refused.
-
-**Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
-and strong beside the lowest eigenvalues of K. So all particles are also displaced alike. No contact between particles
-then changes, and only particles at walls may feel other forces. (K by differences contains such forces.)
+**Forces by position** that belong to no contact may be weak beside contacts, and strong beside the lowest eigenvalues
+of K. So all particles are also displaced alike, which changes no contact between them.
 """
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,19 +28,14 @@ from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_arrays import STILL_STEP, has_bodies, on_coordinates, owned_array, set_up_run, set_velocity
 from .look_in_a_copy import in_a_copy, quieten, styles_of
 
-LARGEST_DIFFERENCE = 1e-3
-"""Difference from which on a packing is refused. Packings at rest have 1e-9 to 1e-5, by curvatures and roundings of
-forces; what is out of balance by the share e of the mean contact force adds some e, for K is that of other overlaps. A
-wrong stiffness of one contact in a hundred gives 1e-2 or more. An eigenvalue of K far below the largest may still be
-wrong by this share of the largest."""
-
-SMALL_DIFFERENCE, DOUBTFUL = 1e-5, 3e-5
-"""Difference below which no other amplitude is tried, and beyond which a fix may act that is not known. Of 63 packings
-of all laws the largest difference was 1.4e-5."""
+LARGEST_DIFFERENCE, SMALL_DIFFERENCE, DOUBTFUL = 1e-3, 1e-5, 3e-5
+"""Differences beyond which a packing is refused, below which no other amplitude is tried, and beyond which a fix may
+act that is not known. Packings at rest have 1e-9 to 1e-5, of 63 packings of all laws 1.4e-5 at most; what is out of
+balance by the share e adds some e. A wrong stiffness of one contact in a hundred gives 1e-2 or more."""
 
 OTHER_STIFFNESS = 1e-6
-"""Stiffness that is none of contacts, as a share of the mean normal stiffness of contacts, from which on a packing is
-refused: far below the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
+"""Stiffness of no contact, as a share of that of contacts, from which on a packing is refused: far below the smallest
+eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
 
 CREEP_SHARE = 0.99
 """Share of Coulomb's bound from which on a contact of a packing that creeps may slide: dashpots bear the rest."""
@@ -56,8 +44,7 @@ STEPS_OF_PROOF, SHORTER_STEPS = 5, 10
 """Steps of LAMMPS and of the linearised packing, and by how much shorter ones are shorter."""
 
 STEP_PHASE = 1.5
-"""Time step times a bound of the fastest rate, which is some three times this rate: five steps are half an oscillation
-of the fastest motion. Below 2 steps are stable."""
+"""Time step times a bound of the fastest rate, some three times this rate. Below 2 steps are stable."""
 
 COMMON_DISPLACEMENT, COMMON_WAY = 1e-3, np.array([0.48, 0.6, 0.64])
 """Common displacement in units of the mean radius, and its direction."""
@@ -71,32 +58,18 @@ class NotProvedError(NotLinearisedError):
     """LAMMPS moves otherwise than the laws of contacts say, and some fix may be the cause."""
 
 
-def prove(lmp: Any, configuration: Configuration, others: str, *, extrapolates: bool) -> float | None:
-    """Relative difference of LAMMPS's motion from that of the linearised packing; None if no contact moves.
+def prove(lmp: Any, configuration: Configuration, others: str) -> float | None:
+    """Relative difference of LAMMPS's motion from that of its linearised packing at rest; None if no contact moves.
 
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        The instance.
-    configuration : Configuration
-        Its packing at rest.
-    others : str
-        What is said of fixes that may exert other forces than contacts.
-    extrapolates : bool
-        Whether dashpots feel velocities of whole steps.
-
-    Raises
-    ------
-    NotProvedError
-        If something acts beside contacts, or may do so.
-    NotTakenError
-        If LAMMPS's forces do not change as K says, and nothing is known to act beside contacts.
+    `others` is what is said of fixes that may exert other forces than contacts. A NotProvedError if something acts
+    beside contacts, or may do so; else a NotTakenError if LAMMPS's forces do not change as K says.
     """
-    c, timestep, by_laws = configuration, _stable_step(configuration), configuration.operators == "laws"
-    if not timestep:
-        return None
-    differs = partial(_least_difference, lmp, c, linear_motion(c, extrapolates=extrapolates))
-    difference = differs(timestep, STEPS_OF_PROOF)
+    c, by_laws, scale = configuration, configuration.operators == "laws", 1 / np.sqrt(configuration.coordinate_mass)
+    k, d = (float((scale * (abs(each) @ scale)).max(initial=0.0)) for each in c.assembled_operators())
+    if not k and not d:
+        return None  # nothing that moves has a contact
+    timestep = STEP_PHASE / (0.5 * (d + np.sqrt(d * d + 4 * k)))  # stable: over a bound of the root of s^2 = d s + k
+    difference = _least_difference(lmp, c, timestep, STEPS_OF_PROOF)
     if by_laws and _other_stiffness(lmp, c) > OTHER_STIFFNESS:
         raise NotProvedError(
             "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
@@ -105,7 +78,8 @@ def prove(lmp: Any, configuration: Configuration, others: str, *, extrapolates: 
     if len(c.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
     if difference > LARGEST_DIFFERENCE:
-        difference = min(difference, differs(timestep / SHORTER_STEPS, STEPS_OF_PROOF * SHORTER_STEPS))
+        shorter = _least_difference(lmp, c, timestep / SHORTER_STEPS, STEPS_OF_PROOF * SHORTER_STEPS)
+        difference = min(difference, shorter)
     if difference <= (DOUBTFUL if by_laws and others else LARGEST_DIFFERENCE):
         return difference
     says = (
@@ -134,58 +108,43 @@ def _likely(c: Configuration, others: str) -> str:
     return "; or ".join(causes)
 
 
-def _stable_step(c: Configuration) -> float:
-    """A time step that is stable for certain, by sums of rows in absolute values; zero if nothing that moves has a
-    contact."""
-    scale = 1 / np.sqrt(c.coordinate_mass)
-    k, d = (float((scale * (abs(each) @ scale)).max(initial=0.0)) for each in c.assembled_operators())
-    rate = 0.5 * (d + np.sqrt(d * d + 4 * k))  # the root of s^2 = d s + k
-    return STEP_PHASE / rate if rate else 0.0
-
-
-def _overlaps(c: Configuration) -> Floats:
-    """Sizes of overlaps, or of the gaps of cohesive contacts; a small one where no contact is known."""
-    overlap = np.abs(c.contacts.overlap)
-    return overlap if len(overlap) else np.array([USUAL_OVERLAP * c.radius.mean()])
-
-
-def _random_start(c: Configuration, time: float) -> Floats:
-    """Random velocities of all that moves and touches something, and a common one, which fixes of the momentum change;
-    after the time the largest displacement of a contact is about as large as its overlap."""
-    random = np.random.Generator(np.random.PCG64(0))
-    translation, rotation = c.vectors(random.standard_normal(c.coordinates))
-    common = random.standard_normal(3)
-    translation += np.sqrt(3) * common / np.linalg.norm(common)
-    touches = ~np.tile(np.isin(np.arange(len(c)), c.rattlers), c.axes)
-    start = c.join_vectors(translation, rotation) * (c.coordinate_free & touches)
-    moves, _ = c.vectors(time * start)
-    overlap, i, j = _overlaps(c), c.contacts.i, c.contacts.j
-    between = moves[i] - np.where(c.contacts.wall[:, None], 0.0, moves[j]) if len(i) else moves
-    size = np.linalg.norm(between, axis=1) / np.maximum(overlap, SMALL_OVERLAP * np.median(overlap))
-    return np.asarray(start / size.max())
-
-
-def _least_difference(lmp: Any, c: Configuration, linear: "LinearMotion", timestep: float, count: int) -> float:
+def _least_difference(lmp: Any, c: Configuration, timestep: float, count: int) -> float:
     """Relative difference of LAMMPS's steps from the linear ones, at the amplitude where it is least.
 
     A K that is not LAMMPS's disagrees at every amplitude: contacts open or begin to slide with large ones, and
     `granular` does not turn a history that has left its plane by less than 1e-10 of Coulomb's bound.
     """
-    one_sided, start = bool(c.contacts.one_sided.any()), _random_start(c, count * timestep)
-    moves = c.coordinate_free | ~np.tile(c.free, c.axes)  # particles that do not move are compared, too
+    # random velocities of all that moves and touches something, and a common one, which fixes of the momentum change
+    random = np.random.Generator(np.random.PCG64(0))
+    translation, rotation = c.vectors(random.standard_normal(c.coordinates))
+    common = random.standard_normal(3)
+    translation += np.sqrt(3) * common / np.linalg.norm(common)
     rattles = np.tile(np.isin(np.arange(len(c)), c.rattlers), c.axes)
-    weight = (np.sqrt(c.coordinate_mass) * (moves & ~(rattles & c.coordinate_free)))[:, None]
+    start = c.join_vectors(translation, rotation) * (c.coordinate_free & ~rattles)
+    # after the time the largest displacement of a contact, or gap, is about as large as its overlap
+    moves, _ = c.vectors(count * timestep * start)
+    i, j, overlap = c.contacts.i, c.contacts.j, np.abs(c.contacts.overlap)
+    if not len(overlap):
+        overlap = np.array([USUAL_OVERLAP * c.radius.mean()])
+    between = moves[i] - np.where(c.contacts.wall[:, None], 0.0, moves[j]) if len(i) else moves
+    size = np.linalg.norm(between, axis=1) / np.maximum(overlap, SMALL_OVERLAP * np.median(overlap))
+    start = start / size.max()
+    one_sided = bool(c.contacts.one_sided.any())
+    moved = c.coordinate_free | ~np.tile(c.free, c.axes)  # particles that do not move are compared, too
+    weight = (np.sqrt(c.coordinate_mass) * (moved & ~(rattles & c.coordinate_free)))[:, None]
 
     def difference(amplitude: float, mix: Floats) -> float:
         """Of the changes of velocities from 1, -1 and 0 times the start, in the mixtures of the columns."""
         starts = amplitude * np.outer(start, [1.0, -1.0, 0.0][: len(mix)])
         ends = np.column_stack([steps_in_a_copy(lmp, c, v, timestep, count) for v in starts.T])
-        seen, expected = (weight * ((each - starts) @ mix) for each in (ends, linear(starts, timestep, count)))
+        seen, expected = (
+            weight * ((each - starts) @ mix) for each in (ends, _linear_steps(c, starts, timestep, count))
+        )
         return float((np.linalg.norm(seen - expected, axis=0) / np.linalg.norm(expected, axis=0)).max())
 
     # the rounding of a displacement is some units in the last place of the largest coordinate; roundings over the
     # amplitude are as large as terms of second order, or of third order
-    rounding = 1e-14 * float(np.abs(c.position).max() / np.median(_overlaps(c)))
+    rounding = 1e-14 * float(np.abs(c.position).max() / np.median(overlap))
     best = difference(rounding ** (1 / 2), np.array([[1.0]]))
     # without what is out of balance: half of the difference of two motions, or each without that from rest
     mix = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 1.0]] if one_sided else [[0.5], [-0.5]])
@@ -220,54 +179,39 @@ def _other_stiffness(lmp: Any, c: Configuration) -> float:
     return float(largest / (size * np.mean(c.contacts.normal_stiffness)))
 
 
-LinearMotion = Callable[[Floats, float, int], Floats]
-"""Velocities of the coordinates, shape (axes N, P), after a number of steps of some length from those at first."""
+def _linear_steps(c: Configuration, velocity: Floats, timestep: float, count: int) -> Floats:
+    r"""Velocities of the coordinates, shape (axes N, P), after some steps of Verlet of the linearised packing,
+    with the forces that are left at rest.
 
-
-def linear_motion(configuration: Configuration, *, extrapolates: bool = False) -> LinearMotion:
-    """Steps of velocity Verlet of the linearised packing, with the forces that are left at rest.
-
-    Forces change by :math:`-K q - C v`, by :math:`B \\int |N \\dot q|\\, dt` in laws with two derivatives
+    Forces change by :math:`-K q - C v`, by :math:`B \int |N \dot q|\, dt` in laws with two derivatives
     (:mod:`~faultgouge.analysis.operators.linearised_contacts`), and by the sliders of the contacts at Coulomb's bound
     (:mod:`~faultgouge.analysis.operators.sliders`), which first move by what they lack of the bound.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        The packing.
-    extrapolates : bool
-        Whether dashpots feel 2 v(n + 1/2) - v(n), as those of mindlin/smooth do, in place of v(n + 1/2).
     """
-    c, (k, d) = configuration, configuration.assembled_operators()
-    sliders, (rates, rescaled) = sliders_of(c), rescaling_operators(c)
+    (k, d), sliders, (rates, rescaled) = c.assembled_operators(), sliders_of(c), rescaling_operators(c)
     size = np.linalg.norm(c.contacts.tangential_force, axis=1)
     missing = np.where(np.isfinite(c.contacts.friction), c.contacts.friction - size, 0.0)[sliders.contact][:, None]
     mobility = (c.coordinate_free / c.coordinate_mass)[:, None]
+    extrapolates = len(size) > 0 and not c.contacts.viscous_slider.any()  # as mindlin/smooth does
+    excess, opening, way = missing, np.zeros((len(size), 1)), np.zeros((len(size), 1))
 
-    def steps(velocity: Floats, timestep: float, count: int) -> Floats:
-        excess, opening = missing, np.zeros((len(c.contacts), 1))
-        way = opening
+    def acceleration(q: Floats, v: Floats) -> Floats:
+        nonlocal excess, opening, way
+        now = rates @ q
+        way, opening = way + np.abs(now - opening), now
+        springs = sliders.excess @ q + sliders.rectified[:, None] * way[sliders.contact]
+        whole = springs + sliders.viscous_excess @ v
+        excess = np.maximum(excess, np.where(sliders.viscous[:, None], whole, springs))
+        slid = sliders.force @ (np.maximum(excess, whole) - missing)
+        return np.asarray(mobility * (c.coordinate_force[:, None] - k @ q - d @ v + rescaled @ way - slid))
 
-        def acceleration(q: Floats, v: Floats) -> Floats:
-            nonlocal excess, opening, way
-            now = rates @ q
-            way, opening = way + np.abs(now - opening), now
-            springs = sliders.excess @ q + sliders.rectified[:, None] * way[sliders.contact]
-            whole = springs + sliders.viscous_excess @ v
-            excess = np.maximum(excess, np.where(sliders.viscous[:, None], whole, springs))
-            slid = sliders.force @ (np.maximum(excess, whole) - missing)
-            return np.asarray(mobility * (c.coordinate_force[:, None] - k @ q - d @ v + rescaled @ way - slid))
-
-        displacement = np.zeros_like(velocity)
-        change = acceleration(displacement, velocity)
-        for _ in range(count):
-            half = velocity + 0.5 * timestep * change
-            displacement = displacement + timestep * half
-            change = acceleration(displacement, 2 * half - velocity if extrapolates else half)
-            velocity = half + 0.5 * timestep * change
-        return velocity
-
-    return steps
+    displacement = np.zeros_like(velocity)
+    change = acceleration(displacement, velocity)
+    for _ in range(count):
+        half = velocity + 0.5 * timestep * change
+        displacement = displacement + timestep * half
+        change = acceleration(displacement, 2 * half - velocity if extrapolates else half)
+        velocity = half + 0.5 * timestep * change
+    return velocity
 
 
 def steps_in_a_copy(lmp: Any, configuration: Configuration, velocity: Floats, timestep: float, steps: int) -> Floats:

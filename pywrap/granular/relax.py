@@ -1,10 +1,10 @@
 """Bring a live LAMMPS to rest by its own dynamics with drag.
 
-`fix viscous`, and `fix viscous/sphere` where this LAMMPS has one, take energy away. The drag follows the motion: where
-the forces are much larger than the drag, particles accelerate, and the drag grows; where the drag balances the forces,
-particles creep, and the drag falls. A packing rests when both the forces and the drags are far below the mean contact
-force. The forces alone do not tell: those of a vibration may all vanish at one time, and a sphere that rolls away feels
-no force.
+`fix viscous`, and `fix viscous/sphere` where this LAMMPS has one, take energy away. Motion ends soonest at the critical
+damping of the slowest mode, where the force out of balance is half of the drag. So the rate of the drag is doubled
+where the force is more than twice the drag, and halved where the force is less than a quarter, as particles then creep.
+A packing rests when both the forces and the drags are far below the mean contact force: the forces of a vibration may
+all vanish at one time, and a sphere that rolls away feels none.
 """
 
 from collections.abc import Callable, Iterable
@@ -12,24 +12,25 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from ...analysis import Configuration, NoEquilibriumError, stable_timestep
-from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .balance import check_balance, force_scale, keeps_moving, motion_remarks
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import Commands, NotTakenError, read_commands
-from .lammps_arrays import owned_array, rows_of, set_up_run, set_velocity
+from .lammps_arrays import on_coordinates, owned_array, rows_of, set_up_run, set_velocity
 from .look_in_a_copy import explain_error, require_instance
 from .looks import acting_fixes, may_act
 
 REST_SHARE = 1e-8
-"""Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
-rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
+"""Residual over the mean contact force at rest: far below couplings that make complex pairs, and above rounding."""
 
 STEPS_BETWEEN_LOOKS = 2000
-"""Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
+STEPS_WITHOUT_GAIN = 50 * STEPS_BETWEEN_LOOKS
+"""Steps between two looks, many beside the set-up of a run, few beside a relaxation; and after which the time step is
+looked at: a packing that rests has come near to it by then."""
 
 FORCE_ROUNDING = 1e-15
 """Rounding of forces: that of the largest coordinate, as a share, times the largest entry of K. Nothing comes closer to
@@ -37,9 +38,6 @@ rest."""
 
 DRAG_RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
-
-STEPS_WITHOUT_GAIN = 50 * STEPS_BETWEEN_LOOKS
-"""Steps after which the time step is looked at: a packing that rests has come near to it by then."""
 
 FARTHEST_DRIFT = 10.0
 """Diameters that particles move in the mean before a packing is said to flow: what has been poured first falls."""
@@ -66,7 +64,7 @@ def relax(
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
         Largest residual at rest, as a share of the mean contact force; of packings so stiff that the rounding of
-        coordinates leaves more, this rounding.
+        coordinates leaves more, this rounding. Not negative.
     steps : int
         Time steps after which a packing that is not at rest flows.
     watch : callable, optional
@@ -81,8 +79,6 @@ def relax(
     ------
     NotTakenError
         If the instance cannot be taken, as by `from_lammps`.
-    BadInputError
-        If `balance` is no such number.
     NoEquilibriumError
         If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
 
@@ -98,21 +94,17 @@ def relax(
     check_balance(balance)
     require_instance(lmp, "relax")
     lines = None if commands is None else read_commands(commands)
-
     start, looked = still_particles(lmp, lines)
     look = partial(take_configuration, lmp, lines, {})
     try:
         found, _ = bring_to_rest(lmp, look, start, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT, watch=watch)
     except NoEquilibriumError as error:
-        dt, was = float(lmp.extract_global("dt")), looked.found
         says = (
             keeps_moving(looked.commands)
-            or " and ".join(motion_remarks(start, was["v"], was["omega"], dt))
+            or " and ".join(motion_remarks(start, looked.found["v"], looked.found["omega"], lmp.extract_global("dt")))
             or may_act(acting_fixes(looked.fixes, looked.commands))
         )
-        if says:
-            raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
-        raise
+        raise NoEquilibriumError("; ".join(filter(None, (str(error).rstrip("."), says))) + ".") from error
     return found.residual / (force_scale(found) or 1.0)
 
 
@@ -128,33 +120,11 @@ def bring_to_rest(
     far: float = 1.0,
     watch: Callable[[str], object] | None = None,
 ) -> tuple[Configuration, float]:
-    """Run with drag until the packing rests.
+    """Run with drag until the packing rests; the packing, which `look` takes, and the rate of the drag per time step.
 
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        The instance.
-    look : callable
-        Takes the packing as it stands.
-    start : Configuration
-        Its particles, which of them move, and the forces of its contacts, as far as these are known.
-    balance, steps
-        As of :func:`relax`.
-    rate : float
-        Of the drag at the beginning, per time step.
-    where : str
-        What errors say of the load.
-    far : float
-        Diameters by which particles move in the mean, and then are said to flow.
-    watch : callable, optional
-        Gets a few words after some steps.
-
-    Returns
-    -------
-    found : Configuration
-        The packing at rest.
-    rate : float
-        Of the drag at the end.
+    `start` has the particles, which of them move, and the forces of contacts as far as these are known. `rate` is that
+    of the drag at the beginning, `where` what errors say of the load, and `far` how many diameters particles move in
+    the mean before they are said to flow. All else is as of :func:`relax`.
     """
     dt, diameter, mass = float(lmp.extract_global("dt")), 2 * float(start.radius.mean()), start.mass[start.free]
     fastest = FASTEST * float(mass.min() / mass.mean())
@@ -162,7 +132,8 @@ def bring_to_rest(
     if lmp.has_style("fix", "viscous/sphere"):  # else dashpots alone stop rotations
         drags["faultgouge_spin"] = "viscous/sphere"
     rate, before = float(np.clip(rate, slowest, fastest)), 0.0
-    way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
+    way, residual, force, rounding, count = 0.0, np.inf, force_scale(start), 0.0, len(start)
+    on_bodies = diags_array(1.0 * start.coordinate_free) if start.constraint is None else (start.constraint != 0).T
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == STEPS_WITHOUT_GAIN:
@@ -180,9 +151,11 @@ def bring_to_rest(
             for (name, style), strength in zip(drags.items() if rate != before else (), strengths, strict=False):
                 lmp.command(f"fix {name} all {style} {strength:.17g}")
             _run(lmp, len(start), where, set_up=rate != before)
-            forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
-            drag_forces = _on_bodies(lmp, start, ("v", "omega"), strengths)
-            residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
+            rates = np.repeat(strengths, [count * start.dimension, count * (start.axes - start.dimension)])
+            rates[count * start.dimension :] /= np.tile(start.radius, start.axes - start.dimension) ** 2
+            forces = on_bodies @ on_coordinates(lmp, start, "f", "torque")
+            drag_forces = on_bodies @ (rates * on_coordinates(lmp, start, "v", "omega"))
+            residual = float(np.linalg.norm(np.reshape([forces, drag_forces], (-1, count)), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
             if watch:
@@ -198,8 +171,9 @@ def bring_to_rest(
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
             if way > far * diameter:
-                moved = f"{far:g} diameters" if far > 1 else "a diameter"
-                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
+                raise NoEquilibriumError(
+                    f"The packing flows{where}: its particles have moved by {counted(round(far), 'diameter')}."
+                )
             ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
             rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
     finally:
@@ -226,20 +200,7 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
             f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
             "it, and set `timer timeout unlimited`."
         )
-    lost = count - lmp.extract_setting("nlocal")
-    if lost:
+    if lost := count - lmp.extract_setting("nlocal"):
         raise NoEquilibriumError(
             f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete it, or take walls."
         )
-
-
-def _on_bodies(lmp: Any, start: Configuration, names: tuple[str, str], weight: tuple[float, float]) -> Floats:
-    """Two arrays of LAMMPS over (1, radius), on what moves: sums where particles move as one; shape (axes, N)."""
-    rows = rows_of(lmp, start)
-    along, around = (factor * owned_array(lmp, name)[rows] for name, factor in zip(names, weight, strict=True))
-    values = start.join_vectors(along, around / start.radius[:, None])
-    if start.constraint is None:
-        values = np.where(np.tile(start.free, start.axes), values, 0.0)
-    else:
-        values = (start.constraint != 0).T @ values
-    return values.reshape(start.axes, -1)

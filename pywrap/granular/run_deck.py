@@ -1,15 +1,12 @@
 """Run a LAMMPS deck as `lmp -in` does in its folder, and take its last state as it stands.
 
-LAMMPS alone reads the deck: loops, includes and labels, `shell cd`, `if ... then ... quit`, logs and files are as
-LAMMPS has them, and no command is left out, added or carried out twice. The plugin watches LAMMPS
+LAMMPS alone reads the deck, and no command is left out, added or carried out twice. The plugin watches LAMMPS
 (`pair_mindlin_smooth/deck_watch.cpp`): LAMMPS tells each command that it has carried out, with variables filled in, and
-at `quit` hands the instance back. Once the deck has ended, the log is closed, and no file of the deck is written any
-more.
+at `quit` hands the instance back. Once the deck has ended, no file of the deck is written any more.
 
-**A state that cannot be taken** is kept, so that hours of a run are not lost. A run of one step writes the restart
-file: in a file that `write_restart` writes after a run, LAMMPS leaves tangential histories out. The deck beside it goes
-on from there with the commands that hold. Several ranks hand their state in such files to a process of one rank, as a
-look needs a copy of the process.
+**A state that cannot be taken** is kept. A run of one step writes the restart file: in a file that `write_restart`
+writes after a run, LAMMPS leaves tangential histories out. The deck beside it goes on from there with the commands that
+hold. Several ranks hand their state in such files to a process of one rank, as a look needs a copy of the process.
 """
 
 import ctypes
@@ -19,12 +16,15 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
 from ...analysis import BadInputError, Configuration, NoEquilibriumError
+from ...analysis.errors import OutputError
+from ...analysis.files.atomic_write import write_whole
 from ...analysis.files.configuration_file import read_configuration
 from ...plugin import directory
 from ..lammps.instance import lammps_instance
@@ -32,43 +32,34 @@ from ..lammps.plain_file_names import shared_folder
 from .balance import BALANCE, check_balance
 from .from_lammps import from_lammps
 from .granular_commands import GIVE_LINES, NotTakenError, commands_of
-from .look_in_a_copy import INSERTS, explain_error, name_of, of_lammps, styles_of
+from .look_in_a_copy import INSERTS, explain_error, of_lammps, styles_of
 from .relax import relax
 
 WORLD = MPI.COMM_WORLD
 
 AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log", "-echo", "both")
-"""Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands."""
-
 OF_RANKS = "PMI", "MPI", "OMPI", "HYD", "SLURM"
-"""Beginnings of the environment's names by which a process is one of several ranks."""
+"""Words of the command line for what the program lmp does without any, and so that LAMMPS tells its commands; and
+beginnings of the environment's names by which a process is one of several ranks."""
 
 BEFORE_RUNS = ctypes.CFUNCTYPE(None)(lambda: None)
-"""What the plugin calls before the first run."""
-
 QUIT = "faultgouge: the deck ends by quit"
-"""What LAMMPS stops with where a deck quits (`deck_watch.cpp`)."""
+"""What the plugin calls before the first run, and what LAMMPS stops with where a deck quits (`deck_watch.cpp`)."""
 
 LIGGGHTS = ("hard_particles", "atom_style granular", "gran model", "property/global", "mesh/surface", "insert/")
 """Words of LIGGGHTS's commands that LAMMPS does not have."""
 
-WRITERS = ("print", "ave/", "record")
-"""Fixes that write files, by the beginnings of their styles."""
-
-ENDS = (*INSERTS, "halt")
-"""Fixes that make particles, or end a run."""
+WRITERS, ENDS = ("print", "ave/", "record"), (*INSERTS, "halt")
+"""Beginnings of the styles of fixes that write files, and of those that make particles, or end a run."""
 
 BEFORE_THE_BOX = ("package", "suffix", "newton", "processors", "atom_modify", "comm_style")
 BEHIND = (
     "lattice", "comm_modify", "neighbor", "neigh_modify", "special_bonds", "timestep", "run_style", "thermo_modify",
     "pair_style", "pair_modify", "pair_coeff", "region", "variable", "fix", "fix_modify",
 )  # fmt: skip
-"""Commands of which a deck that goes on has those that hold, before and behind read_restart."""
-
 NAMED, ADDED = ("region", "variable", "fix"), ("pair_coeff", "fix_modify", "comm_modify", "neigh_modify")
-"""Commands of which the last one of each name holds, and of which all hold."""
-
-RESTART = "RESTART.FILE"
+"""Commands of which a deck that goes on has those that hold, before and behind read_restart; those of which the last
+one of each name holds, and those of which all hold."""
 
 
 def run_deck(
@@ -86,16 +77,12 @@ def run_deck(
     ----------
     path : Path
         The deck.
-    balance : float
-        As of :func:`~faultgouge.pywrap.from_lammps`.
-    relaxes : bool
-        Whether the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`.
+    balance, relaxes
+        As of `from_lammps`; and whether the last state comes to rest first, by `relax`.
     keep : Path, optional
         A state that cannot be taken, or at which LAMMPS stops, is kept in a new restart file beside this one.
-    show : callable, optional
-        Gets how far `relaxes` has come.
-    use : callable, optional
-        Gets the instance and its packing before the instance is closed.
+    show, use : callable, optional
+        Get how far `relaxes` has come; and the instance and its packing before the instance is closed.
 
     Raises
     ------
@@ -172,7 +159,7 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
         plugin.faultgouge_watch(lmp.lmp, told, BEFORE_RUNS)
         try:
             with open(path.name, "rb") as stream:  # LAMMPS's bindings do not take any name
-                lmp.file(name_of(stream))
+                lmp.file(f"/dev/fd/{stream.fileno()}")
             complete = True
         except Exception as error:  # LAMMPS's bindings raise any error
             stopped = "" if QUIT in str(error) else explain_error(error)
@@ -187,18 +174,13 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
             "pair_style, fix wall/gran and what makes particles as LAMMPS's manual has them (docs/decks.md)."
         )
     if lmp.extract_setting("box_exist"):  # no file of the deck is written any more, and no run ends early
-        lost = [
-            words[words.index("lost") + 1] for words in carried_out if words[0] == "thermo_modify" and "lost" in words
-        ]
-        lmp.command("thermo_style custom step")
-        lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
-        for name in lmp.available_ids("dump"):
-            lmp.command(f"undump {name}")
-        for name, style in styles_of(lmp).fixes.items():
-            if style.startswith(WRITERS):
-                lmp.command(f"unfix {name}")
-        lmp.command("restart 0")
-        lmp.command("timer timeout unlimited")
+        told_lost = [words for words in carried_out if words[0] == "thermo_modify" and "lost" in words]
+        lost = told_lost[-1][told_lost[-1].index("lost") + 1] if told_lost else "error"
+        lmp.commands_list([
+            "thermo_style custom step", f"thermo_modify lost {lost}", "restart 0", "timer timeout unlimited",
+            *(f"undump {name}" for name in lmp.available_ids("dump")),
+            *(f"unfix {name}" for name, style in styles_of(lmp).fixes.items() if style.startswith(WRITERS)),
+        ])  # fmt: skip
     return lmp, carried_out, stopped
 
 
@@ -213,47 +195,25 @@ def _keep_state(lmp: Any, carried_out: list[list[str]], keep: Path, deck: Path) 
                 lmp.command(line)
         except Exception as error:  # LAMMPS's bindings raise any error
             return f"The state is not kept: {explain_error(error)}"
-        lines = _deck_lines(carried_out, styles_of(lmp).fixes)
-        kept, says = Path(), ""
+        fixes = styles_of(lmp).fixes
+        stem, says = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII), ""  # LAMMPS reads the name in a line
         if WORLD.rank == 0:
+            names = (keep.with_name(f"{stem}{f'.{number}' * (number > 0)}.restart") for number in count())
+            kept = next(name for name in names if not (os.path.lexists(name) or os.path.lexists(f"{name}.in")))
+            lines = [f"# goes on where {deck.name} has ended", *_deck_lines(carried_out, fixes, kept.name), ""]
+            says = (
+                f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it goes on from there: "
+                f"faultgouge import {kept} --relax, or with a line run in that deck."
+            )
             try:
-                kept = _store(max(folder.iterdir()), keep, [f"# goes on where {deck.name} has ended", *lines])
-            except OSError as error:
-                says = f"The state is not kept: {error.filename}: {error.strerror}."
-        kept, says = WORLD.bcast((kept, says), root=0)
-    return says or (
-        f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it goes on from there: "
-        f"faultgouge import {kept} --relax, or with a line run in that deck."
-    )
+                write_whole(kept, max(folder.iterdir()).read_bytes())
+                write_whole(Path(f"{kept}.in"), os.fsencode("\n".join(lines)))
+            except OutputError as error:
+                says = f"The state is not kept: {error}"
+        return WORLD.bcast(says, root=0)
 
 
-def _store(state: Path, keep: Path, lines: list[str]) -> Path:
-    """Copy a restart file, and write its deck, to names that are not there yet."""
-    stem = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII)  # LAMMPS reads the name in a line
-    number = 0
-    while True:
-        file = keep.with_name(f"{stem}.{number}.restart" if number else f"{stem}.restart")
-        made: list[Path] = []
-        try:
-            for path, fill in (
-                (file, state.read_bytes()),
-                (Path(f"{file}.in"), os.fsencode("\n".join(lines).replace(RESTART, file.name) + "\n")),
-            ):
-                with path.open("xb") as stream:
-                    made.append(path)
-                    stream.write(fill)
-                    stream.flush()
-                    os.fsync(stream.fileno())
-            return file
-        except OSError as error:
-            for path in made:
-                path.unlink(missing_ok=True)
-            if not isinstance(error, FileExistsError):
-                raise
-            number += 1
-
-
-def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]:
+def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str], restart: str) -> list[str]:
     """The lines of a deck that goes on from a restart file: of all commands, in words, that LAMMPS has carried out,
     those that hold; `fixes` are the styles of those that there are, by ID."""
     since = 1 + max((k for k, words in enumerate(carried_out) if words[0] == "clear"), default=-1)
@@ -273,7 +233,7 @@ def _deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str
         for words in last.values()
         if words[0] in BEHIND and words[2:3] != ["delete"] and (not words[0].startswith("fix") or words[1] in stay)
     ]
-    return [*map(_line, before), f"read_restart {RESTART}", *map(_line, behind)]
+    return [*map(_line, before), f"read_restart {restart}", *map(_line, behind)]
 
 
 def _line(words: list[str]) -> str:

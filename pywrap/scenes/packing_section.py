@@ -14,10 +14,7 @@ from ...analysis.arrays import Floats
 from ...analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
-from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence
-
-SPARSEST = 10.0
-"""Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
+from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence, refuse
 
 
 class SettlingLoad(Section):
@@ -91,21 +88,13 @@ class GeneratedPacking(Section):
 
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":
-        if self.top > self.disks:
-            raise refusal_sentence("top", f"= {self.top} is more than the {self.disks} disks of the packing: lower it")
+        refuse(self.top > self.disks, "top", f"= {self.top} is more than all {self.disks} disks: lower it")
         cutoff = 2 * max(self.radii)
-        if self.periodic and self.width < 2 * cutoff:
-            says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
-            raise refusal_sentence("width", says)
-        row = 2 * self.disks * max(self.radii)
-        if self.width > SPARSEST * row:
-            says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
-            raise refusal_sentence("width", says)
-        if not self.periodic and (self.top < self.disks or row > self.width):
-            says = (
-                "= false leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
-            )
-            raise refusal_sentence("periodic", says)
+        says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
+        refuse(self.periodic and self.width < 2 * cutoff, "width", says)
+        open_ = not self.periodic and (self.top < self.disks or self.disks * cutoff > self.width)
+        says = "leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
+        refuse(open_, "periodic", f"= false {says}")
         return self
 
     def start(self, draw: int = 0) -> Disks:
@@ -150,12 +139,11 @@ class StoredPacking(Section):
                 upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
             elif self.top is not None or self.frame is not None:
                 raise BadInputError("a run.h5 is taken as it is, with its first frame: leave top and frame out")
-        except OSError as error:
-            says = f'= "{self.file.name}" cannot be read at {self.file} ({error.strerror}): correct the name'
-            raise refusal_sentence("file", says) from None
-        except (PackingFileError, BadInputError) as error:
-            says = f'= "{self.file.name}" is refused: {str(error).rstrip(".")}'
-            raise refusal_sentence("file", says) from None
+        except (OSError, PackingFileError, BadInputError) as error:
+            cause = getattr(error, "strerror", None)
+            says = f"cannot be read at {self.file} ({cause}): correct the name"
+            says = says if cause else f"is refused: {str(error).rstrip('.')}"
+            raise refusal_sentence("file", f'= "{self.file.name}" {says}') from None
         return self
 
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:
@@ -176,10 +164,7 @@ class StoredPacking(Section):
     @property
     def disks(self) -> int:
         """Number of disks."""
-        if not is_hdf5(self.file):
-            return len(read_disks(self.file, self.frame))
-        with RunFile(self.file) as run:
-            return len(run.packing(0)) if len(run) else 0
+        return len(self.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0)))
 
 
 def _kind(section: Any) -> str:

@@ -1,6 +1,6 @@
 """The sections [perturb] and [drive] of a scene: undamped and driven runs, and the signals in them."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
@@ -22,6 +22,7 @@ from .validation import (
     Positive,
     Section,
     refusal_sentence,
+    refuse,
     rule,
 )
 
@@ -39,22 +40,14 @@ class Inertia(Section):
     inertia_factor: Positive = 1.0
 
 
-def refuse_first(cases: Iterable[tuple[str, object, str]]) -> None:
-    """Refuse the first key of (key, whether it is wrong, advice) that is wrong."""
-    for key, wrong, advice in cases:
-        if wrong:
-            raise refusal_sentence(key, advice)
-
-
-SignalKeys: TypeAlias = Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]
-
-
 class WithSignal(Section):
-    """A section with a signal, "pulse" or a file: of each kind the keys that it needs, and those that it takes."""
+    """A section with a signal, "pulse" or a file; `TAKES` has the keys of each kind, with "!" those that it needs."""
 
-    TAKES: ClassVar[SignalKeys] = {}
+    TAKES: ClassVar[Mapping[str | None, str]] = {}
 
-    @field_validator("signal", check_fields=False)
+    signal: Annotated[str | None, NamesFile()] = None
+
+    @field_validator("signal")
     @classmethod
     def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
         if signal in (None, "pulse"):
@@ -63,26 +56,19 @@ class WithSignal(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> "WithSignal":
-        signal = getattr(self, "signal", None)
-        kind = signal if signal in (None, "pulse") else "file"
+        kind = self.signal if self.signal in (None, "pulse") else "file"
         of = {None: "a section without signal", "pulse": 'signal = "pulse"', "file": "a signal from a file"}[kind]
-        needs, takes = self.TAKES[kind or ""]
-        for key in dict.fromkeys(key for keys in self.TAKES.values() for each in keys for key in each):
-            value = getattr(self, key)
-            if key in needs and (value is None or not (value or key == "at")):
-                raise refusal_sentence(key, f"is missing: {of} needs it, above 0")
-            if key not in (*needs, *takes) and value != type(self).model_fields[key].default:
-                raise refusal_sentence(key, f"does not belong to {of}: leave it out")
-        refuse_first(self._cases())
+        for key in dict.fromkeys(" ".join(self.TAKES.values()).replace("!", "").split()):
+            value, default = getattr(self, key), type(self).model_fields[key].default
+            absent = value is None or not (value or key == "at")
+            refuse(f"{key}!" in self.TAKES[kind].split() and absent, key, f"is missing: {of} needs it, above 0")
+            belongs = key in self.TAKES[kind].replace("!", "").split()
+            refuse(not belongs and value != default, key, f"does not belong to {of}: leave it out")
         try:
             self.forcing()
         except SignalError as error:
             raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
         return self
-
-    def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that are missing or do not fit, for `refuse_first`."""
-        raise NotImplementedError
 
     def forcing(self) -> Signal | None:
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor."""
@@ -123,10 +109,10 @@ class Perturb(WithSignal, Inertia):
         What of the floor's motion the signal gives; None is its velocity.
     """
 
-    TAKES: ClassVar[SignalKeys] = {
-        "": ((), ("amplitude", "omega")),
-        "pulse": (("amplitude", "omega"), ("on", "quantity")),
-        "file": ((), ("on", "quantity", "channel", "scale", "stretch")),
+    TAKES: ClassVar = {
+        None: "amplitude omega",
+        "pulse": "amplitude! omega! on quantity",
+        "file": "on quantity channel scale stretch",
     }
 
     fx: Annotated[NotNegative | None, FORCE] = None
@@ -139,17 +125,16 @@ class Perturb(WithSignal, Inertia):
     on: Literal["layer", "floor"] | None = None
     amplitude: Annotated[NotNegative, WAVE] = 0.0
     omega: Annotated[NotNegative | None, FREQUENCY] = None
-    signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
     scale: Number | None = None
     stretch: Positive | None = None
     quantity: Literal["velocity", "acceleration", "displacement"] | None = None
 
-    def _cases(self) -> Iterator[tuple[str, object, str]]:
-        of_floor = 'belongs to on = "floor": the signal is the force on the layer otherwise'
-        yield "quantity", self.quantity and self.on != "floor", of_floor
-        forced = self.amplitude > 0 and self.omega is None
-        yield "omega", forced, "is missing: an amplitude needs the frequency of its forcing"
+    @model_validator(mode="after")
+    def _fits(self) -> "Perturb":
+        refuse(self.quantity and self.on != "floor", "quantity", 'belongs to on = "floor", whose motion it is')
+        refuse(self.amplitude > 0 and self.omega is None, "omega", "is missing: an amplitude needs its frequency")
+        return self
 
     @property
     def cosine(self) -> tuple[float, float]:
@@ -177,11 +162,9 @@ class Perturb(WithSignal, Inertia):
         """
         signal = None if self.signal == "pulse" else self.forcing()
         if signal is not None and signal.shortest < dt:
-            stretch = (
-                f"lower perturb.time_step, or raise perturb.stretch to {(self.stretch or 1) * dt / signal.shortest:.3g}"
-            )
-            rows = f"perturb.signal has rows that are {signal.shortest:.3g} apart"
-            raise SignalError(f"{rows}, and the time step is {dt:.3g}, too long to follow it: {stretch}")
+            slower = f"raise perturb.stretch to {(self.stretch or 1) * dt / signal.shortest:.3g}"
+            rows = f"perturb.signal has rows that are {signal.shortest:.3g} apart, and the time step is {dt:.3g}"
+            raise SignalError(f"{rows}, too long to follow it: lower perturb.time_step, or {slower}")
 
 
 LOADINGS = 2.0
@@ -230,11 +213,7 @@ class Drive(WithSignal):
         What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
     """
 
-    TAKES: ClassVar[SignalKeys] = {
-        "": ((), ()),
-        "pulse": (("at", "omega"), ("scale", "on")),
-        "file": (("at",), ("scale", "on")),
-    }
+    TAKES: ClassVar = {None: "", "pulse": "at! omega! scale on", "file": "at! scale on"}
 
     spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
     velocity: Annotated[Number | None, VELOCITY] = None
@@ -245,24 +224,21 @@ class Drive(WithSignal):
     until: Annotated[Positive | None, TIME] = None
     slips: Annotated[int, Field(ge=1)] | None = None
     states: Annotated[Positive | None, TIME] = None
-    signal: Annotated[str | None, NamesFile()] = None
     at: Annotated[NotNegative | None, TIME] = None
     omega: Annotated[Positive | None, FREQUENCY] = None
     on: Literal["layer", "floor"] = "layer"
     scale: Annotated[Number, WAVE] = 1.0
 
-    def _cases(self) -> Iterator[tuple[str, object, str]]:
-        rigid, endless = self.spring == "rigid", self.until is None and self.protocol is None
-        both = (self.velocity is None) == (self.protocol is None)
-        yield "velocity", both, "or drive.protocol says how the far end of the spring moves: give one of the two"
+    @model_validator(mode="after")
+    def _moves(self) -> "Drive":
+        rigid, both = self.spring == "rigid", (self.velocity is None) == (self.protocol is None)
+        refuse(both, "velocity", "or drive.protocol says how the far end of the spring moves: give one of the two")
         moves = "protocol" if self.protocol else "velocity"
-        yield moves, self.fastest == 0, "moves nothing: give a velocity other than 0"
-        no_end = "is missing: give the length of the run, or drive.slips, after which it ends"
-        yield "until", endless and self.slips is None, no_end
-        no_slips = "is missing: a rigid drive counts no slips, and needs the length of the run"
-        yield "until", endless and rigid, no_slips
-        no_spring = "needs a spring: a rigid drive moves the layer at its velocity, and counts no slips"
-        yield "slips", rigid and self.slips is not None, no_spring
+        refuse(self.fastest == 0, moves, "moves nothing: give a velocity other than 0")
+        no_end = f"is missing: give the length of the run{'' if rigid else ', or drive.slips, after which it ends'}"
+        refuse(self.until is self.protocol is None and (rigid or self.slips is None), "until", no_end)
+        refuse(rigid and self.slips is not None, "slips", "needs a spring: a rigid drive counts no slips")
+        return self
 
     @property
     def stages(self) -> tuple[tuple[float, float], ...]:

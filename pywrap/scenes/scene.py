@@ -26,8 +26,9 @@ coordinates.
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -43,17 +44,18 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ...analysis import MindlinLaw
+from ...analysis.files.atomic_write import read_plain
 from .command_sections import command_of, study_model, study_models
 from .packing_section import GeneratedPacking, PackingSection
-from .run_sections import Drive, Inertia, Perturb, refuse_first
+from .run_sections import Drive, Inertia, Perturb
 from .sections import Damping, Friction, Law, Load, Output, Ramp, Relax
 from .units import Units, in_units, real_units
 from .validation import (
     SceneError,
     Section,
-    digest_of,
     files_named,
     read_toml,
+    refuse,
     require_section,
     sections_in,
     sentence,
@@ -119,9 +121,8 @@ class Scene(Section):
     @field_validator("ramp", mode="before")
     @classmethod
     def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
-        if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
-            return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS}
-        return ramp
+        lacks_step = isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data
+        return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS} if lacks_step else ramp  # type: ignore[dict-item]
 
     _inertia: Inertia = PrivateAttr(Inertia())
 
@@ -136,50 +137,42 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        refuse_first(self._cases())
-        real_units(self)
-        return self
-
-    def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that do not agree with others, or that no packing can bear, for `refuse_first`."""
-        packing, fy, mu, ramp, perturb = self.packing, self.load.fy, self.law.mus[0], self.ramp, self.perturb
-        repulsion = MindlinLaw(self.law.kn, kt=0.0, mu=0.0, exponent=self.law.exponent)
+        """Refuse keys that do not agree with others, or that no packing can bear."""
+        packing, fy, kn, ramp, perturb = self.packing, self.load.fy, self.law.kn, self.ramp, self.perturb
+        repulsion = MindlinLaw(kn, kt=0.0, mu=0.0, exponent=self.law.exponent)
         overlap = float(repulsion.overlap_of_force(fy))
         stiffness = float(repulsion.normal_stiffness(overlap))
         if perturb is not None:
-            missing = "is missing: give it, or a section [ramp] in which the onset is sought"
-            yield "perturb.fx", perturb.fx is None and ramp is None, missing
+            refuse(perturb.fx is ramp is None, "perturb.fx", "is missing: give it, or [ramp], to seek the onset")
             lightest = min(1.0, self.inertia_factor) * (getattr(packing, "mass", None) or 1.0)
             steps = perturb.time / (perturb.time_step or 0.1 * math.sqrt(lightest / (6 * stiffness)))
             says = f"= {perturb.time:g} takes {steps:.2g} time steps, a year and more: lower it, or raise the time_step"
-            yield "perturb.time", steps > STEPS_OF_A_YEAR, says
+            refuse(steps > STEPS_OF_A_YEAR, "perturb.time", says)
             if ramp and perturb.fx is not None:
                 says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
-                yield "perturb.fx", perturb.fx > max(0.0, ramp.first), says
+                refuse(perturb.fx > max(0.0, ramp.first), "perturb.fx", says)
             if isinstance(perturb.target, tuple):
                 last = max(perturb.target)
                 says = f"names disk {last}: name disks from 0 to {packing.disks - 1}"
-                yield "perturb.target", last >= packing.disks, says
+                refuse(last >= packing.disks, "perturb.target", says)
         if isinstance(packing, GeneratedPacking):
             smallest, rounding = min(packing.radii), DOUBLE_ROUNDING * packing.width * stiffness / fy
-            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius "
-            says += f"{smallest:g}, where the contact law does not hold: lower it, or raise law.kn = {self.law.kn:g}"
-            yield "load.fy", not overlap < smallest, says
-            says = f"= {self.law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is "
-            says += f"{rounding:.1g} of F_y, and no packing comes to rest: lower it, or raise load.fy"
-            yield "law.kn", not rounding < ROUNDING_LIMIT, says
-        says = (
-            "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use for "
-        )
-        says += 'it: set ramp.method = "newton", or leave [damping] out'
-        yield "damping", self.damping and ramp and ramp.method == "overdamped", says
+            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, beyond the smallest radius {smallest:g}"
+            refuse(not overlap < smallest, "load.fy", f"{says}: lower it, or raise law.kn = {kn:g}")
+            says = f"= {kn:g} is too stiff for load.fy = {fy:g}: the last digit of coordinates is {rounding:.1g} of F_y"
+            rests = "and no packing comes to rest: lower it or packing.width, or raise load.fy"
+            refuse(not rounding < ROUNDING_LIMIT, "law.kn", f"{says}, {rests}")
+        says = 'acts in dynamics, and no equilibrium depends on it: set ramp.method = "newton", or leave [damping] out'
+        refuse(self.damping and ramp and ramp.method == "overdamped", "damping", says)
         if (drive := self.drive) is not None:
-            yield "drive", mu == 0, "needs friction, which holds the layer: give law.mu a value above 0"
-            end = drive.length(mu * fy) if drive.at is not None else math.inf
-            says = f"= {drive.at} is after the end of the run, {end:g}: let the signal begin before"
-            yield "drive.at", (drive.at or 0.0) >= end, says
-            slows = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
-            yield "damping.tau", drive.spring == "rigid" and self.damping and self.damping.tau is not None, slows
+            strength, at = self.law.mus[0] * fy, drive.at or 0.0
+            refuse(strength == 0, "drive", "needs friction, which holds the layer: give law.mu a value above 0")
+            end = drive.length(strength) if drive.at is not None else math.inf
+            refuse(at >= end, "drive.at", f"= {at} is after the end of the run, {end:g}: let the signal begin before")
+            says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
+            refuse(drive.spring == "rigid" and self.damping and self.damping.tau, "damping.tau", says)
+        real_units(self)
+        return self
 
     @classmethod
     def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
@@ -203,10 +196,12 @@ class Scene(Section):
         path = Path(path)
         mapping = read_toml(path, "scene")
         whole = mapping if packing is None else mapping | {"packing": packing}
-        return cls._check(whole, path.parent, str(path), command)
+        return cls.from_mapping(whole, path.parent, command, str(path))
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> Scene:
+    def from_mapping(
+        cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None, name: str = "scene"
+    ) -> Scene:
         """Make a scene from a mapping with the contents of a TOML file.
 
         Parameters
@@ -217,34 +212,36 @@ class Scene(Section):
             The folder to which a relative packing.file refers.
         command : str, optional
             As in `from_toml`.
+        name : str
+            What errors call the scene.
 
         Raises
         ------
         SceneError
             If the mapping does not describe a scene that can be run.
         """
-        return cls._check(mapping, Path(folder), "scene", command)
-
-    @classmethod
-    def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> Scene:
         if not isinstance(mapping, Mapping):
             raise SceneError(f"{name}: a scene maps the names of sections to their keys: give a dict.")
-        wanted, context = command_of(command), dict[str, Any](folder=folder)
-        others = {key: model for key in mapping if key not in SECTIONS and (model := study_model(str(key)))}
-        sections = SECTIONS | {key: (model,) for key, model in others.items()}
+        wanted, context = command_of(command), dict[str, Any](folder=Path(folder))
+        alone = {key: model for key in mapping if key not in SECTIONS and (model := study_model(str(key)))}
+        sections = SECTIONS | {key: (model,) for key, model in alone.items()}
         # keys of all sections are checked, and first: a misspelled name makes the right one missing, too
-        if unknown := next(_unknown(mapping, sections), None):
-            raise SceneError(f"{name}: {unknown_key(unknown, SECTIONS | study_models())}.")
+        for section, keys in mapping.items():
+            path = [] if section in sections or section in cls.model_fields else [str(section)]
+            if section in sections and isinstance(keys, Mapping):
+                known = {key for model in sections[section] for key in model.model_fields}
+                path = next(([section, str(key)] for key in keys if key not in known), [])
+            if path:
+                raise SceneError(f"{name}: {unknown_key(path, SECTIONS | study_models())}.")
         try:
             mapping = mapping if wanted is None else wanted.part(mapping)
             if "units" in mapping:
                 mapping = in_units(mapping, context)
-            alone = {key: model for key, model in others.items() if key in mapping}
-            if wanted is not None and "perturb" not in wanted.reads and "perturb" in mapping:
+            if wanted is not None and "perturb" not in wanted.reads:
                 alone["perturb"] = Inertia
-            # of keywords that are known at run time alone, which no overload has
-            part = create_model("Part", **{key: (model, ...) for key, model in alone.items()})  # type: ignore[call-overload]
-            found = dict(part.model_validate(mapping, context=context))
+            # sections that a scene has of others: of keywords that are known at run time alone, which no overload has
+            models = {key: (model, ...) for key, model in alone.items() if key in mapping}
+            found = dict(create_model("Part", **models).model_validate(mapping, context=context))  # type: ignore[call-overload]
             context["inertia"] = found.pop("perturb", Inertia())
             own = {key: section for key, section in mapping.items() if key not in alone}
             scene = cls.model_validate(own | found, context=context)
@@ -261,16 +258,13 @@ class Scene(Section):
     def files(self) -> dict[str, tuple[Path, ...]]:
         """The files that the scene names, by section.key; of a dump also those beside it."""
         sections = ((name, getattr(self, name)) for name in type(self).model_fields)
-        return {
-            f"{name}.{key}": paths
-            for name, section in sections
-            if isinstance(section, Section)
-            for key, paths in files_named(section).items()
-        }
+        named = ((name, files_named(each)) for name, each in sections if isinstance(each, Section))
+        return {f"{name}.{key}": paths for name, found in named for key, paths in found.items()}
 
     def digests(self) -> dict[str, str]:
         """SHA-256 of the contents of these files, by section.key."""
-        return {key: digest_of(paths) for key, paths in self.files.items()}
+        texts = {key: b"".join(map(read_plain, paths)) for key, paths in self.files.items()}
+        return {key: hashlib.sha256(text).hexdigest() for key, text in texts.items()}
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.
@@ -281,16 +275,6 @@ class Scene(Section):
         sections: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
         inertia = self._inertia.model_dump(exclude_defaults=True)
         return {**({"perturb": inertia} if inertia else {}), **sections}
-
-
-def _unknown(mapping: Mapping[str, Any], sections: Mapping[str, tuple[type[Section], ...]]) -> Iterator[list[str]]:
-    """The names of unknown sections, and of unknown keys behind those of their sections."""
-    for name, section in mapping.items():
-        if name not in sections and name not in Scene.model_fields:
-            yield [str(name)]
-        elif name in sections and isinstance(section, Mapping):
-            known = {key for model in sections[name] for key in model.model_fields}
-            yield from ([name, str(key)] for key in section if key not in known)
 
 
 SECTIONS = {name: models for name, field in Scene.model_fields.items() if (models := sections_in(field.annotation))}

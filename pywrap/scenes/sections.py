@@ -23,7 +23,7 @@ from .validation import (
     Positive,
     Section,
     is_number,
-    refusal_sentence,
+    refuse,
     rule,
 )
 
@@ -32,6 +32,13 @@ NUMBER_PATTERN = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 
 EQUILIBRIA = 10_000_000
 """Increments of a ramp: half a day and 150 GB for 100 disks."""
+
+
+def multiple_of(unit: str, value: float, text: str) -> float | None:
+    """ "2/7 kn" or "10 v0" as a number, where the unit has this value; None for a text that is no multiple of it."""
+    match = re.fullmatch(rf"(?:({NUMBER_PATTERN})(?:/({NUMBER_PATTERN}))? )?{unit}", text.strip())
+    above, below = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
+    return above * value / below if below and is_number(above) else None
 
 
 class Law(Section):
@@ -69,18 +76,15 @@ class Law(Section):
             return kt
         if "kn" not in info.data:
             return 0.0  # kn is missing or refused, and that is what gets reported
-        match = re.fullmatch(rf"(?:({NUMBER_PATTERN})(?:/({NUMBER_PATTERN}))? )?kn", kt.strip())
-        numerator, denominator = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
-        if denominator == 0:
-            raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
-        return numerator * info.data["kn"] / denominator
+        share = multiple_of("kn", info.data["kn"], kt)
+        refuse(share is None, "", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
+        return share
 
     @model_validator(mode="after")
     def _known(self) -> "Law":
-        if self.exponent not in EXPONENTS:
-            raise refusal_sentence("exponent", f"= {self.exponent:g} is refused: give {known_exponents()}")
-        if self.history == "rescaled" and self.exponent < LEAST_RESCALED:
-            raise refusal_sentence("history", f'= "rescaled" needs a law.exponent of {LEAST_RESCALED} or more')
+        refuse(self.exponent not in EXPONENTS, "exponent", f"= {self.exponent:g} is refused: give {known_exponents()}")
+        flat = self.history == "rescaled" and self.exponent < LEAST_RESCALED
+        refuse(flat, "history", f'= "rescaled" needs a law.exponent of {LEAST_RESCALED} or more')
         return self
 
     @property
@@ -112,8 +116,7 @@ class Damping(Section):
 
     @model_validator(mode="after")
     def _not_empty(self) -> "Damping":
-        if not self.model_fields_set:
-            raise refusal_sentence("", "has nothing in it: give cn, ct or tau, or leave the section out")
+        refuse(not self.model_fields_set, "", "has nothing in it: give cn, ct or tau, or leave the section out")
         return self
 
 
@@ -172,18 +175,16 @@ class Ramp(Section):
     def _turning_points(cls, until: float | tuple[float, ...]) -> float | tuple[float, ...]:
         points = until if isinstance(until, tuple) else (until,)
         for here, there in pairwise((0.0, *points)):
-            if here == there:
-                raise refusal_sentence("", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
+            refuse(here == there, "", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
         return points if len(points) > 1 else points[0]
 
     @model_validator(mode="after")
     def _one_step_at_least(self) -> "Ramp":
-        if self.step > abs(self.first):
-            raise refusal_sentence("step", f"= {self.step} is larger than until = {self.first}: take a smaller step")
+        says = f"= {self.step} is larger than until = {self.first}: take a smaller step"
+        refuse(self.step > abs(self.first), "step", says)
         count = self.length / self.step
-        if not count < EQUILIBRIA:
-            says = f"= {self.step:g} makes {count:.2g} equilibria up to until = {self.turning_points[-1]:g}"
-            raise refusal_sentence("step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
+        says = f"= {self.step:g} makes {count:.2g} equilibria up to until = {self.turning_points[-1]:g}"
+        refuse(not count < EQUILIBRIA, "step", f"{says}, and {EQUILIBRIA:.0e} are the most: take a larger step")
         return self
 
     @property
@@ -228,16 +229,16 @@ class Friction(Section):
     @field_validator("v_ss")
     @classmethod
     def _multiple(cls, v_ss: float | str, info: ValidationInfo) -> float | str:
-        if isinstance(v_ss, str) and not _multiple_of_v0(v_ss):
+        if isinstance(v_ss, str):
             advice = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
-            raise refusal_sentence("", f"= {v_ss!r} is refused: {advice}")
-        if isinstance(v_ss, str) and info.data.get("v0") == 0:
-            raise refusal_sentence("", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
+            refuse(not multiple_of("v0", 1.0, v_ss), "", f"= {v_ss!r} is refused: {advice}")
+            says = f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0'
+            refuse(info.data.get("v0") == 0, "", says)
         return v_ss
 
     def velocity_scale(self, v0: float) -> float:
         """v_ss for a threshold v0, velocity."""
-        return _multiple_of_v0(self.v_ss) * v0 if isinstance(self.v_ss, str) else self.v_ss
+        return multiple_of("v0", v0, self.v_ss) or 0.0 if isinstance(self.v_ss, str) else self.v_ss
 
 
 class Output(Section):
@@ -253,10 +254,3 @@ class Output(Section):
 
     trajectory: bool | None = None
     dumps: bool = False
-
-
-def _multiple_of_v0(text: str) -> float:
-    """10 for "10 v0"; 0 for any other text."""
-    match = re.fullmatch(rf"(?:({NUMBER_PATTERN}) )?v0", text.strip())
-    factor = float(match[1] or 1) if match else 0.0
-    return factor if is_number(factor) else 0.0

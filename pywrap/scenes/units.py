@@ -44,14 +44,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import MindlinLaw
 from .packing_section import GeneratedPacking, PackingSection, StoredPacking
-from .validation import HERTZ_EXPONENT, Section, is_number, refusal_sentence, rounded, to_si
+from .validation import HERTZ_EXPONENT, Section, is_number, refuse, rounded, to_si
 
 MISMATCH = 0.01
 """Relative difference of the overburden from that of the scene up to which the two count as one."""
@@ -94,25 +94,31 @@ class Units(Section):
     @field_validator(*SI)
     @classmethod
     def _converts(cls, text: str | None, info: ValidationInfo) -> str | None:
-        if text is not None and not 0 < to_si(text, SI[str(info.field_name)]) < math.inf:
-            raise refusal_sentence("", f'= "{text}" is refused: give a quantity above 0')
+        wrong = text is not None and not 0 < to_si(text, SI[str(info.field_name)]) < math.inf
+        refuse(wrong, "", f'= "{text}" is refused: give a quantity above 0')
         return text
 
     @model_validator(mode="after")
     def _complete(self) -> Units:
-        if (self.restitution is None) != (self.impact_velocity is None):
-            key = "impact_velocity" if self.impact_velocity is None else "restitution"
-            raise refusal_sentence(key, "is missing: the restitution depends on the velocity, so give both")
+        for key, other in (("impact_velocity", self.restitution), ("restitution", self.impact_velocity)):
+            alone = other is not None and getattr(self, key) is None
+            refuse(alone, key, "is missing: the restitution depends on the velocity, so give both")
         return self
+
+    def si(self, key: str) -> float:
+        """A quantity as a number of SI units."""
+        return to_si(getattr(self, key), SI[key])
 
     @property
     def grain_mass(self) -> float:
         """Mass of a smallest grain, kg."""
         return float(self.si("density") * (np.pi * self.si("grain_diameter") ** 3 / 6))
 
-    def si(self, key: str) -> float:
-        """A quantity as a number of SI units."""
-        return to_si(getattr(self, key), SI[key])
+    @property
+    def stiffness(self) -> float:
+        """k of two smallest grains, N/m^(3/2)."""
+        modulus, diameter = self.si("youngs_modulus"), self.si("grain_diameter")
+        return modulus * math.sqrt(diameter) / (3 * (1 - self.poisson_ratio**2))
 
 
 @dataclass(frozen=True)
@@ -127,8 +133,8 @@ class RealUnits:
         Area of the layer per disk of the upper layer, m^2.
     shear_modulus, density : float
         Of the rock, Pa and kg/m^3.
-    fy : float
-        Force on each disk of the upper layer, in units of the scene.
+    kn, fy : float
+        Stiffness, and force on each disk of the upper layer, in units of the scene.
     """
 
     length: float
@@ -137,6 +143,7 @@ class RealUnits:
     area: float
     shear_modulus: float
     density: float
+    kn: float
     fy: float
 
     @property
@@ -183,25 +190,6 @@ class RealUnits:
         return own | {"force_N": self.force, "overburden_Pa": self.overburden}
 
 
-class Layer(NamedTuple):
-    """The quantities that, with the grains, fix the units of a scene; in units of the scene.
-
-    Attributes
-    ----------
-    diameter, mass : float
-        Of the smallest disks.
-    width : float
-        Of the box.
-    top : int
-        Disks of the upper layer.
-    """
-
-    diameter: float
-    mass: float
-    width: float
-    top: int
-
-
 class Grains(BaseModel):
     """The sections that fix the units of a scene; without packing.settle_at, whose units they fix."""
 
@@ -215,8 +203,8 @@ class Grains(BaseModel):
             return packing
         units, radii = info.data["units"], packing.get("radii", GeneratedPacking.model_fields["radii"].default)
         numbers = [each for each in radii if is_number(each) and each > 0] if isinstance(radii, (list, tuple)) else []
-        if numbers and any(isinstance(each, str) for each in radii):
-            raise refusal_sentence("radii", "has numbers beside quantities: give all of them a unit, or none")
+        says = "has numbers beside quantities: give all of them a unit, or none"
+        refuse(numbers and any(isinstance(each, str) for each in radii), "radii", says)
         length = units.si("grain_diameter") / (2 * min(numbers, default=0.5))
         assert info.context is not None
         info.context["units"] = SimpleNamespace(length=length, mass=units.grain_mass, time=math.nan)
@@ -238,22 +226,21 @@ def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, 
     law, load = scene.get("law", {}), scene.get("load", {})
     if not (isinstance(law, Mapping) and isinstance(load, Mapping)):
         return scene  # which is refused
-    check_exponent(law.get("exponent", HERTZ_EXPONENT))
     if isinstance(section, GeneratedPacking):
         smallest = 2 * min(section.radii) * context["units"].length
-        if abs(smallest / units.si("grain_diameter") - 1) > 1e-9:
-            of_units = f'units.grain_diameter = "{units.grain_diameter}" is their diameter: make them agree'
-            raise refusal_sentence("packing.radii", f"has smallest disks of {smallest:.6g} m, and {of_units}")
+        says = f'units.grain_diameter = "{units.grain_diameter}" is their diameter: make them agree'
+        other = abs(smallest / units.si("grain_diameter") - 1) > 1e-9
+        refuse(other, "packing.radii", f"has smallest disks of {smallest:.6g} m, and {says}")
         if isinstance(packing.get("mass"), str):
             _agree("packing.mass", packing["mass"], "kg", units.grain_mass, "the mass of a smallest grain")
             packing["mass"], section = 1.0, section.model_copy(update={"mass": 1.0})
-    layer = layer_of(section)
-    kn, own = law.get("kn", ""), rounded(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ_EXPONENT))
+    kn = law.get("kn", "")
+    if isinstance(kn, str) and kn:
+        _agree("law.kn", kn, "N/m**1.5", units.stiffness, "the stiffness of Hertz's contact of these grains")
+    given = kn if is_number(kn) and kn > 0 else None
+    context["units"] = real = units_of(units, section, law.get("exponent", HERTZ_EXPONENT), given, fy=1.0)
     if isinstance(kn, str):
-        if kn:
-            _agree("law.kn", kn, "N/m**1.5", hertz_stiffness(units), "the stiffness of Hertz's contact of these grains")
-        law = {**law, "kn": own}
-    context["units"] = real = units_of(units, layer, kn if is_number(kn) and kn > 0 else own, fy=1.0)
+        law = {**law, "kn": real.kn}
     if "fy" not in load and units.overburden is not None:
         load = {**load, "fy": rounded(units.si("overburden") / real.overburden)}
     return {**scene, "packing": packing, "law": law, "load": load}
@@ -261,9 +248,8 @@ def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, 
 
 def _agree(key: str, text: str, unit: str, grains: float, what: str) -> None:
     """Refuse a quantity that is not the one that the grains have."""
-    if abs(to_si(text, unit, key) / grains - 1) > MISMATCH:
-        says = f'= "{text}" is not {what}, {grains:.6g} {unit}: leave {key} out, or correct the keys of [units]'
-        raise refusal_sentence(key, says)
+    says = f'= "{text}" is not {what}, {grains:.6g} {unit}: leave {key} out, or correct the keys of [units]'
+    refuse(abs(to_si(text, unit, key) / grains - 1) > MISMATCH, key, says)
 
 
 def real_units(scene: Any) -> RealUnits | None:
@@ -277,52 +263,34 @@ def real_units(scene: Any) -> RealUnits | None:
     """
     if (units := scene.units) is None:
         return None
-    check_exponent(scene.law.exponent)
-    real = units_of(units, layer_of(scene.packing), scene.law.kn, scene.load.fy)
+    real = units_of(units, scene.packing, scene.law.exponent, scene.law.kn, scene.load.fy)
     wanted = real.overburden if units.overburden is None else units.si("overburden")
-    if abs(real.overburden / wanted - 1) > MISMATCH:
-        way = f"leave load.fy out, or set load.fy = {scene.load.fy * wanted / real.overburden:.6g}"
-        says = f"= {units.overburden} is not the load of the scene, which presses with {real.overburden:.4g} Pa: {way}"
-        raise refusal_sentence("units.overburden", says)
+    way = f"leave load.fy out, or set load.fy = {scene.load.fy * wanted / real.overburden:.6g}"
+    says = f"= {units.overburden} is not the load of the scene, which presses with {real.overburden:.4g} Pa: {way}"
+    refuse(abs(real.overburden / wanted - 1) > MISMATCH, "units.overburden", says)
     return real
 
 
-def units_of(units: Units, layer: Layer, kn: float, fy: float) -> RealUnits:
-    """The units of a scene with this layer, stiffness and load."""
-    diameter, modulus = units.si("grain_diameter"), units.si("youngs_modulus")
-    length = diameter / layer.diameter
-    mass = units.grain_mass / layer.mass
-    time = math.sqrt(kn * mass / (hertz_stiffness(units) * math.sqrt(length)))
-    area = layer.width * length * diameter / layer.top
-    shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
-    return RealUnits(length, mass, time, area, shear_modulus, units.si("density"), fy)
-
-
-def hertz_stiffness(units: Units) -> float:
-    """k of two smallest grains, N/m^(3/2)."""
-    modulus, diameter = units.si("youngs_modulus"), units.si("grain_diameter")
-    return modulus * math.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2))
-
-
-def check_exponent(exponent: float) -> None:
-    """Refuse a law that is not Hertz's, which has no stiffness from the moduli of its grains."""
-    if exponent != HERTZ_EXPONENT:
-        raise refusal_sentence("units", f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out")
-
-
-def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
-    """The layer that a section [packing] describes; refused if the section gives no width."""
+def units_of(
+    units: Units, section: GeneratedPacking | StoredPacking, exponent: float, kn: float | None, fy: float
+) -> RealUnits:
+    """The units of a scene with this packing, law and load; without k_n that of grains of diameter and mass one."""
+    says = f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out"
+    refuse(exponent != HERTZ_EXPONENT, "units", says)
     if isinstance(section, GeneratedPacking):
+        diameter, mass, top = 2 * min(section.radii), section.mass or 1.0, section.top
         width = section.width if section.periodic else None
-        layer = Layer(2 * min(section.radii), section.mass or 1.0, width or 0.0, section.top)
     else:
         packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
-        k, width = packing.radius.argmin(), packing.box_length
+        k, width, top = packing.radius.argmin(), packing.box_length, int(packing.top.sum())
         diameter, mass = 2 * float(packing.radius[k]), float(packing.mass[k])
-        layer = Layer(diameter, mass, width or 0.0, int(packing.top.sum()))
-    if width is None:
-        raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
-    return layer
+    refuse(width is None, "units", "has no stress without the width of the layer: take a periodic packing")
+    kn = kn or rounded(STIFFNESS_OF_ONE * mass * diameter ** (1 - HERTZ_EXPONENT))
+    length, mass_of_one = units.si("grain_diameter") / diameter, units.grain_mass / mass
+    time = math.sqrt(kn * mass_of_one / (units.stiffness * math.sqrt(length)))
+    area = (width or 0.0) * length * units.si("grain_diameter") / top
+    shear_modulus = units.si("youngs_modulus") / (2 * (1 + units.poisson_ratio))
+    return RealUnits(length, mass_of_one, time, area, shear_modulus, units.si("density"), kn, fy)
 
 
 def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:

@@ -3,16 +3,14 @@
 pydantic finds the errors in a section; `sentence` describes them in the terms of the scene.
 """
 
-import hashlib
 import math
-import os
 import re
 import reprlib
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from difflib import get_close_matches
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar, get_args
 
@@ -30,7 +28,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
 from ...analysis.arrays import LARGEST, SMALLEST
-from ...analysis.files.atomic_write import read_plain, read_plain_text
+from ...analysis.files.atomic_write import read_plain_text
 from ...analysis.files.formats.tables import unit_registry
 
 if sys.version_info >= (3, 11):
@@ -39,11 +37,28 @@ else:
     import tomli as tomllib
 
 
+def refusal_sentence(key: str, says: str) -> PydanticCustomError:
+    """An error of `key` of the section (or of the field, if empty) that is being checked."""
+    return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
+
+
+def refuse(wrong: object, key: str, says: str) -> None:
+    """Refuse a key where it is wrong."""
+    if wrong:
+        raise refusal_sentence(key, says)
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value of a scene is a number with which one can compute."""
+    # A comparison, because math.isfinite overflows on whole numbers, which TOML may hold of any size.
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and (value == 0 or SMALLEST <= abs(value) <= LARGEST)  # type: ignore[arg-type]
+
+
 def check_number(value: float) -> float:
     """The number; refused if it is neither 0 nor of a size with which one can compute."""
-    if value != 0 and not SMALLEST <= abs(value) <= LARGEST:
-        between = f"give a number between {SMALLEST:g} and {LARGEST:g}"
-        raise refusal_sentence("", f"= {reprlib.repr(value)} is refused: {between}")
+    between = f"give a number between {SMALLEST:g} and {LARGEST:g}"
+    refuse(not is_number(value), "", f"= {reprlib.repr(value)} is refused: {between}")
     return value
 
 
@@ -83,10 +98,7 @@ def rounded(number: float) -> float:
     return float(f"{number:.{DIGITS}g}")
 
 
-Powers: TypeAlias = tuple[float, float, float]
-
-
-def _dimension(own: Powers, floor: Powers | None = None) -> BeforeValidator:
+def _dimension(*powers: float, floor: tuple[float, ...] = ()) -> BeforeValidator:
     """Marks the dimension of a number, or of each in a list: a text with a unit becomes a number in units of the scene.
 
     The dimension is given by powers of mass, length and time; `floor` is that where the key `on` of the section, which
@@ -100,23 +112,23 @@ def _dimension(own: Powers, floor: Powers | None = None) -> BeforeValidator:
         real = (info.context or {}).get("units")
         if real is None or not isinstance(value, str) or OWN_WORDS.search(value):
             return value
-        powers = floor if floor and info.data.get("on") == "floor" else own
-        if powers == (1, 1, -2):
+        own = floor if floor and info.data.get("on") == "floor" else powers
+        if own == (1, 1, -2):
             with suppress(PydanticCustomError):
                 return rounded(to_si(value, "Pa") / real.stress(1.0))
         turns = 2 * math.pi if re.search(r"[Hh]ertz|Hz", value) else 1.0
-        unit = " * ".join(f"{name}**({power:g})" for name, power in zip(("kg", "m", "s"), powers, strict=True) if power)
-        own_unit = real.mass ** powers[0] * real.length ** powers[1] * real.time ** powers[2]
-        return rounded(to_si(value, unit) * turns / own_unit)
+        unit = " * ".join(f"{name}**({power:g})" for name, power in zip(("kg", "m", "s"), own, strict=True) if power)
+        size = real.mass ** own[0] * real.length ** own[1] * real.time ** own[2]
+        return rounded(to_si(value, unit) * turns / size)
 
     return BeforeValidator(number_of)
 
 
-MASS, LENGTH, TIME = (_dimension(powers) for powers in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-FREQUENCY, VELOCITY, FORCE = (_dimension(powers) for powers in ((0, 0, -1), (0, 1, -1), (1, 1, -2)))
-STIFFNESS, DASHPOT = (_dimension((1, 1 - HERTZ_EXPONENT, power)) for power in (-2, -1))
-VISCOSITY, SPRING = (_dimension((1, 0, power)) for power in (-1, -2))
-WAVE = _dimension((1, 1, -2), floor=(0, 1, -1))
+MASS, LENGTH, TIME = _dimension(1, 0, 0), _dimension(0, 1, 0), _dimension(0, 0, 1)
+FREQUENCY, VELOCITY, FORCE = _dimension(0, 0, -1), _dimension(0, 1, -1), _dimension(1, 1, -2)
+STIFFNESS, DASHPOT = (_dimension(1, 1 - HERTZ_EXPONENT, power) for power in (-2, -1))
+VISCOSITY, SPRING = _dimension(1, 0, -1), _dimension(1, 0, -2)
+WAVE = _dimension(1, 1, -2, floor=(0, 1, -1))
 """A force on the layer, or a velocity of the floor."""
 
 T = TypeVar("T")
@@ -159,30 +171,12 @@ def files_named(section: BaseModel) -> dict[str, tuple[Path, ...]]:
     """The files that a section names, by key; of a dump also those of contacts and parameters beside it."""
     found = {}
     for key, field in type(section).model_fields.items():
-        name = str(getattr(section, key)).removeprefix("ids:@")
-        if any(isinstance(mark, NamesFile) for mark in field.metadata) and (
-            os.path.isabs(name) or name != str(getattr(section, key))
-        ):
-            path = Path(name)
+        given = str(getattr(section, key))
+        path = Path(given.removeprefix("ids:@"))
+        if any(isinstance(mark, NamesFile) for mark in field.metadata) and (path.is_absolute() or given[:5] == "ids:@"):
             beside = [path.with_suffix(each) for each in (".contacts", ".params")] if path.suffix == ".disks" else []
-            found[key] = (path, *(each for each in beside if each.exists()))
+            found[key] = (path, *filter(Path.exists, beside))
     return found
-
-
-def digest_of(paths: Iterable[Path]) -> str:
-    """SHA-256 of the contents of files, in hexadecimal digits; each is read once until something about it changes."""
-    places = [(path, os.stat(path)) for path in paths]
-    return _digest(tuple((str(path), at.st_ino, at.st_size, at.st_mtime_ns) for path, at in places))
-
-
-@cache
-def _digest(files: tuple[tuple[str, int, int, int], ...]) -> str:
-    return hashlib.sha256(b"".join(read_plain(name) for name, *_ in files)).hexdigest()
-
-
-def refusal_sentence(key: str, says: str) -> PydanticCustomError:
-    """An error of `key` of the section (or of the field, if empty) that is being checked."""
-    return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
 
 
 def rule(advice: str) -> WrapValidator:
@@ -201,9 +195,9 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
     """An error of pydantic as: where, what is wrong, what to do; `sections` has the model of each section."""
     kind, context = error["type"], error.get("ctx", {})
     path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
+    place = ".".join([*path, *filter(None, [context.get("key")])])
     if kind == "extra_forbidden":
         return unknown_key(path, sections, "stored" in error["loc"])
-    place = ".".join([*path, *filter(None, [context.get("key")])])
     if kind == "refused":
         return f"{place} {context['says']}"
     if kind == "missing":
@@ -221,26 +215,14 @@ def unknown_key(path: list[str], sections: Mapping[str, tuple[type[Section], ...
     """The key that nobody knows, and the nearest one, or the place where it belongs."""
     *above, key = path
     homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
-    if not above:
-        if homes:
-            return f"{key} stands outside of its section: move it below [{homes[0]}]"
-        (nearest,) = get_close_matches(key, ["precision", *sections], 1, cutoff=0)
-        return f"{key} is no key of a scene: the nearest is {nearest}"
-    section = above[0]
-    if section in homes and stored:
+    if homes and not above:
+        return f"{key} stands outside of its section: move it below [{homes[0]}]"
+    section, where = (f"{above[0]}.", f"[{above[0]}]") if above else ("", "a scene")
+    if stored and "packing" in homes:
         return f"packing.{key} cannot stand beside packing.file, which decides it: leave one of them out"
-    if homes:
-        return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
-    keys = [name for model in sections[section] for name in model.model_fields]
-    (nearest,) = get_close_matches(key, keys, 1, cutoff=0)
-    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest} of {', '.join(keys)}"
-
-
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value of a scene is a number with which one can compute."""
-    # A comparison, because math.isfinite overflows on whole numbers, which TOML may hold of any size.
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return number and (value == 0 or SMALLEST <= abs(value) <= LARGEST)  # type: ignore[arg-type]
+    keys = [name for model in sections[above[0]] for name in model.model_fields] if above else ["precision", *sections]
+    nearest = f"{section}{get_close_matches(key, keys, 1, cutoff=0)[0]} of {', '.join(keys)}"
+    return f"{section}{key} is no key of {where}: the nearest is {f'{homes[0]}.{key}' if homes else nearest}"
 
 
 def require_section(section: T | None, name: str) -> T:

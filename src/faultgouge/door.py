@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from html import escape
@@ -18,8 +18,10 @@ from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
 from .analysis import stress as stress_of_packing
 from .analysis import vibrations as vibrations_of_packing
+from .analysis.files.atomic_write import telling
 from .analysis.files.configuration_file import holds_configuration, read_configuration
-from .analysis.files.formats import is_hdf5, packing_of, upper_layer
+from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
+from .analysis.files.formats.disks import LAYER_WAYS
 from .analysis.files.formats.lammps_dump import dump_frames
 from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
@@ -94,20 +96,30 @@ def load(
     from .pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(path, None if frame == -1 else frame)
-    given = dict(disks.given) | {key: each for key, each in (("fy", fy), ("fx", fx)) if each is not None}
-    if law is None and {"kn", "kt", "mu"} <= given.keys():
-        law = law_of_parameters(given)
-    missing = [name for name, known in (("law", law is not None), ("fy", "fy" in given)) if not known]
-    if law is None or missing:
-        way = f"load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, top=10)"
-        raise BadInputError(f"{path} does not say {' and '.join(missing)}: {way} takes the disks as they stand.")
-    disks = disks if width is None else replace(disks, box_length=width)
-    if top == 0:
-        layer = np.zeros(len(disks), dtype=np.bool_)
-    else:
-        layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
-    load = {key: given.get(key, usual) for key, usual in (("fx", 0.0), ("fy", 0.0), ("inertia_factor", 1.0))}
-    return packing_of(disks, law, layer, drag_time=given.get("tau"), **load)
+    given = {key: value for key, value in (("fy", fy), ("fx", fx)) if value is not None}
+    if top is None and disks.top is not None and not disks.top.any():
+        top = 0
+    return packing_under(disks if width is None else replace(disks, box_length=width), law, given, top)
+
+
+def packing_under(disks: Disks, law: MindlinLaw | None, load: Mapping[str, Any], top: str | int | None) -> Packing:
+    """Disks with a law, a load (fx, fy, inertia_factor, drag_time, kn, mu) and an upper layer, or those of the file."""
+    given = {"drag_time": disks.given.get("tau"), **disks.given, **load}
+    ways = {} if top is not None or disks.top is not None else {"--top 10": "which disks are the upper layer"}
+    if law is None and "kn" not in given:
+        ways["--kn 2e5"] = "the normal stiffness"
+    if "fy" not in given:
+        ways["--fy 3"] = "the load on each disk of the layer"
+    if ways:
+        names, example = " ".join(each.split()[0] for each in ways), f"`faultgouge import ... {' '.join(ways)}`"
+        python = f"load({Path(disks.source).name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, top=10)"
+        says = f"{disks.source} does not say {' and '.join(ways.values())}: add {names}, as in {example}"
+        raise BadInputError(f"{says}; --top takes {LAYER_WAYS}; in Python {python} takes the disks as they stand.")
+    with telling(disks.source, "describes no possible packing", ValueError):
+        law = law or law_of_parameters({"kt": 2 * given["kn"] / 7, "mu": 1.0} | given)
+    layer = np.zeros(len(disks), dtype=np.bool_) if top == 0 else upper_layer(disks, top)
+    values = {key: given[key] for key in ("fx", "fy", "inertia_factor", "drag_time") if key in given}
+    return packing_of(disks, law, layer, **values)
 
 
 def is_deck(file: Path) -> bool:
@@ -127,20 +139,18 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
     --------
     >>> found = faultgouge.frames("run.h5")
     >>> len(found), round(found[-1].fx, 3)
-    (25, 2.4)
+    (17, 2.4)
     >>> [round(packing.fx, 3) for packing in found[:3]]
-    [0.0, 0.1, 0.2]
+    [0.0, 0.15, 0.3]
     """
 
     def __init__(self, file: str | Path) -> None:
-        self.path = path_of(file, "frames")
+        self.path, self._count = path_of(file, "frames"), 1
         if self.path.suffix == ".disks":
             self._count = sum(1 for _ in dump_frames(self.path))
         elif self.path.suffix == ".h5" and not holds_configuration(self.path):
             with RunFile(self.path) as run:
                 self._count = len(run)
-        else:
-            self._count = 1
 
     def __len__(self) -> int:
         return self._count
@@ -378,19 +388,18 @@ def view(
     packings, series, axis, title = [last], None, None, f"{path.name}: {in_words(last)}"
     if path.suffix != ".disks" and not holds_configuration(path):
         with RunFile(path) as run:
-            turns = [] if "time" in run.observables else turning_points(run.fx)
-            most = loads_shown(len(last)) if loads is None else loads
-            chosen = sorted({*equally_spaced(len(run), most), *turns})
+            driven = "time" in run.observables
+            turns = [] if driven else turning_points(run.fx)
+            chosen = sorted({*equally_spaced(len(run), loads_shown(len(last)) if loads is None else loads), *turns})
             packings = [packing_in(run, k) for k in chosen]
             series = run.series("undamped") if "undamped" in run.names_of_series else None
-            if "time" in run.observables:
+            span = " to ".join(f"{run.fx[k]:g}" for k in sorted({0, *turns, len(run) - 1}))
+            what = "undamped run" if series is not None else "equilibria"
+            title = f"{path.name}: {what} of {len(last)} disks, Fₓ = {span}"
+            if driven:
                 axis = Axis("t", "time of the run", run.observable("time")[chosen])
                 title = f"{path.name}: states of a driven run of {len(last)} disks"
-            else:
-                span = " to ".join(f"{run.fx[k]:g}" for k in sorted({0, *turns, len(run) - 1}))
-                what = "undamped run" if series is not None else "equilibria"
-                title = f"{path.name}: {what} of {len(last)} disks, Fₓ = {span}"
-    if seconds(packings) > 5:
-        say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
+    if (needed := seconds(packings)) > 5:
+        say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {needed:.0f} s")
     write_view(packings, output, title, series, progress, axis)
     return ViewedPage(output)

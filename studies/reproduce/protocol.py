@@ -8,28 +8,29 @@ scene asks for it, a minute perturbation just below the onset follows (:mod:`~fa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...analysis import Growth, Onset, OnsetError, Packing, RunFile, Spectrum, fit_growth, spectrum
-from ...analysis.arrays import Floats
+from ...analysis import Onset, OnsetError, Packing, RunFile, Spectrum, fit_growth, spectrum
 from ...analysis.counted import counted
 from ...analysis.files.atomic_write import check_own, make_folder, write_json, write_text
 from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
 from ...analysis.responses.growth import PLATEAU_SHARE, growing_range
-from ...analysis.responses.response import Response, layer_force, linear_response
+from ...analysis.responses.normal_form import LEAST_CROSSOVER
+from ...analysis.responses.response import layer_force, linear_response
 from ...figures import PairCurve
 from ...figures.packing import draw_packing
 from ...figures.pages import render
 from ...figures.pair import draw_pair
 from ...figures.series import draw_growth
-from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
+from ...pywrap import Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, load_at_onset, onset_run
 from ...pywrap.runs.undamped import ACCURATE_SHARE, perturb, time_step
 from ...pywrap.scenes.run_sections import Perturb
@@ -45,7 +46,6 @@ from ..triggering import (
     Triggering,
     equilibrium_at,
     follow,
-    largest,
     sensitivity,
     series_of,
     weakened_rate,
@@ -71,45 +71,8 @@ ABOVE_NOISE = 1e3
 COMPARED_TIME = 50.0
 """Length of the run that is compared with linear response, in `unit_of_time`: a few hundred periods of the pair."""
 
-
-class GrowthRun(NamedTuple):
-    """An undamped run above the onset.
-
-    Attributes
-    ----------
-    start : Equilibrium
-        Where it began.
-    time, msd : ndarray, shape (T,)
-        D(t).
-    spectrum : Spectrum
-        Of the equilibrium.
-    time_step : float
-        Of the run.
-    predicted : float
-        Growth rate of D from the spectrum and the time step's dispersion, 1/time.
-    measured : Growth or None
-        Fitted to D(t); None where D does not grow far enough between its noise and where it levels off.
-    """
-
-    start: Equilibrium
-    time: Floats
-    msd: Floats
-    spectrum: Spectrum
-    time_step: float
-    predicted: float
-    measured: Growth | None
-
-
-class Triggered(NamedTuple):
-    """What is triggered: the runs, of which "strong" has a perturbation `ABOVE_NOISE` as strong, for a shorter time:
-    its D stands out of the noise of doubles; the linear response to that, time step included; the growth rate of D
-    with the weakened friction where the control starts, from the spectrum, 0 if it is stable; and the response on the
-    way to the onset."""
-
-    found: Triggering
-    response: Response
-    control_rate: float | None
-    sensitive: Sensitivity
+Triggered = tuple[Triggering, Sensitivity, dict[str, Any]]
+"""What is triggered: the runs, the response on the way to the onset, and their numbers for summary.json."""
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | None = None) -> dict[str, Any]:
@@ -136,14 +99,14 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     runs = _ramps(scene, output / "run.h5", say)
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")
-    fitted = growth.measured
-    say(f"growth rate of D: {fitted and f'{fitted.rate:.6g}'} measured, {growth.predicted:.6g} predicted")
+    fitted = growth["measured"]
+    say(f"growth rate of D: {fitted and f'{fitted.rate:.6g}'} measured, {growth['predicted']:.6g} predicted")
     summary = summary_of(scene, runs, growth)
     write_json(output / "summary.json", summary)  # what follows may fail
-    figures: dict[str, Callable[[], Figure]] = {"figure1": partial(draw_packing, growth.start.packing)}
+    figures: dict[str, Callable[[], Figure]] = {"figure1": partial(draw_packing, growth["start"].packing)}
     figures["figure3"] = partial(draw_pair, [PairCurve.of_onset(run) for run in runs])
     if fitted is not None:
-        figures["figure4"] = partial(draw_growth, growth.time, growth.msd, growth.predicted, fitted)
+        figures["figure4"] = partial(draw_growth, growth["time"], growth["msd"], growth["predicted"], fitted)
     draw_all(figures, output, say)
     shaken, another = triggered or scene, None
     found: Triggered | str = "The scene has no sections [perturb] and [friction], so that nothing is triggered"
@@ -153,14 +116,14 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
             say("the packing to be triggered")
             another = _ramps(triggered, path, say)
         found = _trigger(shaken, another or runs, path, say)
-        summary["triggering"] = {"says": found} if isinstance(found, str) else triggering_summary(found)
+        summary["triggering"] = {"says": found} if isinstance(found, str) else found[2]
         if another is not None:
             onsets = [{"mu": run.mu, "onset": run.as_dict()} for run in another]
             summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
     if isinstance(found, str):
-        say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
+        say(f"{found.rstrip('.')}: no figures 2 and 5")
     else:
-        draw_all(triggering_figures(found.found), output, say)
+        draw_all(triggering_figures(found[0]), output, say)
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary
@@ -190,19 +153,33 @@ def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = Non
     return run
 
 
-def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
-    """An undamped run where the ramp shows the fastest growth by one pair."""
+def growth_run(scene: Scene, run: Onset, path: Path) -> dict[str, Any]:
+    """An undamped run where the ramp shows the fastest growth by one pair; its series goes to the file of the ramp.
+
+    Returns
+    -------
+    dict
+        start, spectrum : the equilibrium where it begins, and its spectrum; time, msd : D(t), shape (T,); time_step :
+        of the run; predicted : growth rate of D from the spectrum and the time step's dispersion, 1 / time; measured :
+        the Growth that is fitted to D(t), None where D does not grow far enough above its noise.
+    """
+
+    def dominance(modes: Spectrum) -> float:
+        """Growth rate of the fastest pair less the rate of the second pair; 0 of a packing that buckles."""
+        first, second, *_ = [*sorted((pair.growth_rate for pair in modes.pairs), reverse=True), 0.0, 0.0]
+        return 0.0 if len(modes.negative) else first - second
+
     candidates = [(each, spectrum(each.packing)) for each in run.equilibria if each.fx > run.fx_c]
-    start, modes = max(candidates, key=lambda each: _dominance(each[1]))
-    if not _dominance(modes):
+    start, modes = max(candidates, key=lambda each: dominance(each[1]))
+    if not dominance(modes):
         raise SceneError(
             f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
             f"F_x = {run.fx_c:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
         )
     dt = time_step(start.packing)
     predicted = modes.growth_rate(dt)
-    time = min(EFOLDS / predicted, MOST_RUN_STEPS * dt)
-    settings = Perturb(fx=start.fx, time=time, inertia_factor=scene.inertia_factor)
+    length = min(EFOLDS / predicted, MOST_RUN_STEPS * dt)
+    settings = Perturb(fx=start.fx, time=length, inertia_factor=scene.inertia_factor)
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.smallest_overlap) ** 2
     samples: list[Sample] = []
@@ -210,29 +187,23 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
         samples.append(sample)
         if sample.msd > 1e6 * ceiling:
             break
-    series = series_of(samples)
+    series, measured = series_of(samples), None
     with RunFile(path, "a") as file:
         file.append_series("undamped", **series)
-    times, msd = series["time"], series["msd"]
-    try:
-        top = min(ceiling, PLATEAU_SHARE * float(msd.max()))
-        measured = fit_growth(times, msd, *growing_range(times, msd, top))
-    except ValueError:
-        measured = None
-    return GrowthRun(start, times, msd, modes, dt, predicted, measured)
-
-
-def _dominance(modes: Spectrum) -> float:
-    """Growth rate of the fastest pair less the rate of the second pair; 0 of a packing that buckles."""
-    if len(modes.negative):
-        return 0.0
-    first, second, *_ = [*sorted((pair.growth_rate for pair in modes.pairs), reverse=True), 0.0, 0.0]
-    return first - second
+    time, msd = series["time"], series["msd"]
+    with suppress(ValueError):
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, PLATEAU_SHARE * float(msd.max()))))
+    found = {"start": start, "spectrum": modes, "time": time, "msd": msd}
+    return found | {"time_step": dt, "predicted": predicted, "measured": measured}
 
 
 def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered | str:
     """A perturbation between the onsets of the weakened and of the static friction, at perturb.fx, or where the onsets
-    say without it; or why there is nothing to trigger. The series go to the file."""
+    say without it; or why there is nothing to trigger. The series go to the file.
+
+    A further run, "strong", has a perturbation `ABOVE_NOISE` as strong, for a shorter time: its D stands out of the
+    noise of doubles, and is compared with the linear response to it.
+    """
     settings, mu_ss = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction").mu_ss
     run, fx = runs[0], settings.fx
     try:
@@ -250,7 +221,8 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
             "window between the two, and nothing to erupt."
         )
     *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
-    modes = spectrum(start.packing)
+    packing = start.packing
+    modes = spectrum(packing)
     if modes.is_stable is False:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
         return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
@@ -261,84 +233,70 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
             file.append_series(name, **series)
 
     found = follow(scene, start, below, EARLY_SAMPLES, store=store)
-    packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
-    time = min(settings.time, COMPARED_TIME * unit_of_time(packing))
-    strong = scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": amplitude, "time": time})})
-    found.runs["strong"] = series_of(perturb(strong, start, early=EARLY_SAMPLES[0]))
-    store("strong", found.runs["strong"])
+    amplitude, time = ABOVE_NOISE * settings.amplitude, min(settings.time, COMPARED_TIME * unit_of_time(packing))
+    stronger = scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": amplitude, "time": time})})
+    strong = found.runs["strong"] = series_of(perturb(stronger, start, early=EARLY_SAMPLES[0]))
+    store("strong", strong)
     force, dt = layer_force(packing, amplitude), time_step(packing, settings.time_step)
-    response = linear_response(packing, found.runs["strong"]["time"], force=force, omega=settings.omega or 0.0, dt=dt)
-    rate = None if below is None else weakened_rate(below.packing, mu_ss)
-    return Triggered(found, response, rate, sensitivity(run))
+    response = linear_response(packing, strong["time"], force=force, omega=settings.omega or 0.0, dt=dt)
+    sensitive, most = sensitivity(run), found.largest("unperturbed", "perturbed", "erupting")
+    near = [pair for pair in sensitive.pairs if pair.amplitude() >= LEAST_CROSSOVER]  # which damping may halve
+    plateaus = None
+    if len(near) > 1:  # undamped amplitudes of the nearest and the farthest pair, and the ratio of epsilon^(-1/2)
+        one, far = sorted((near[0], near[-1]), key=lambda pair: pair.epsilon)
+        theory = float(np.sqrt(far.epsilon / one.epsilon))
+        plateaus = {"measured": one.amplitude() / far.amplitude(), "theory": theory}
+    return (
+        found,
+        sensitive,
+        {
+            "fx": start.fx,
+            "v0": found.weakening.v0,
+            "v_ss": found.weakening.v_ss,
+            "largest_D": most,
+            "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
+            "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
+            **found.outcome,
+            "forecast": found.foreseen._asdict(),
+            "largest_D_of_the_control": found.largest("control")["control"] if below else None,
+            "rate_of_the_control": weakened_rate(below.packing, mu_ss) if below else None,
+            "linear_response_deviation": float(np.abs(strong["msd"] - response.msd).max() / strong["msd"].max()),
+            "smallest_mu": float(found.runs["erupting"]["friction"].min()),
+            "amplitude_exponent": sensitive.fit.exponent,
+            "amplitude_exponent_error": sensitive.fit.error,
+            "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
+            "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in near],
+            "plateaus": plateaus,
+        },
+    )
 
 
-def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, Any]:
+def summary_of(scene: Scene, runs: list[Onset], growth: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers for summary.json."""
-    fitted = growth.measured
-    return {
-        "scene": scene.resolved(),
-        "ramps": [
+    fitted, ramps = growth["measured"], []
+    for run in runs:
+        first, *_, last = run.equilibria
+        ramps.append(
             {
                 "mu": run.mu,
                 "equilibria": len(run.equilibria),
                 "evaluations": [each.evaluations for each in run.equilibria],
                 "largest_residual": max(each.residual for each in run.equilibria),
-                "floor": run.equilibria[-1].floor,
-                "contacts": len(run.equilibria[0].packing.contacts),
-                "rattlers": run.equilibria[0].packing.rattlers.tolist(),
-                "solid_fraction": solid_fraction(run.equilibria[0].packing),
+                "floor": last.floor,
+                "contacts": len(first.packing.contacts),
+                "rattlers": first.packing.rattlers.tolist(),
+                "solid_fraction": solid_fraction(first.packing),
                 "flows_beyond": run.flows_beyond,
                 "onset": run.as_dict(),
             }
-            for run in runs
-        ],
-        "growth": {
-            "fx": growth.start.fx,
-            "time_step": growth.time_step,
-            "predicted_rate": growth.predicted,
-            "measured": fitted and asdict(fitted),
-            "deviation": fitted and fitted.rate / growth.predicted - 1,
-        },
-    }
-
-
-def triggering_summary(triggered: Triggered) -> dict[str, Any]:
-    """Numbers of the triggering for summary.json."""
-    found, sensitive = triggered.found, triggered.sensitive
-    runs, outcome, strong = found.runs, found.outcome, found.runs["strong"]["msd"]
-    most = {name: largest(runs[name]) for name in ("unperturbed", "perturbed", "erupting")}
-    near, plateaus = sensitive.near, None
-    if len(near) > 1:  # undamped amplitudes of the nearest and the farthest pair, and the ratio of epsilon^(-1/2)
-        one, far = sorted((near[0], near[-1]), key=lambda pair: pair.epsilon)
-        theory = float(np.sqrt(far.epsilon / one.epsilon))
-        plateaus = {"measured": one.amplitude() / far.amplitude(), "theory": theory}
-    return {
-        "fx": found.start.fx,
-        "v0": found.weakening.v0,
-        "v_ss": found.weakening.v_ss,
-        "largest_D": most,
-        "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
-        "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
-        "verdict": outcome.verdict,
-        "weakens_at": outcome.crossing,
-        "jump": outcome.jump,
-        "growth_in_decades": outcome.growth,
-        "growth_after_the_jump": outcome.fitted and asdict(outcome.fitted),
-        "forecast": found.foreseen._asdict(),
-        "largest_D_of_the_control": largest(runs["control"]) if "control" in runs else None,
-        "rate_of_the_control": triggered.control_rate,
-        "linear_response_deviation": float(np.abs(strong - triggered.response.msd).max() / strong.max()),
-        "smallest_mu": float(runs["erupting"]["friction"].min()),
-        "amplitude_exponent": sensitive.fit.exponent,
-        "amplitude_exponent_error": sensitive.fit.error,
-        "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
-        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in near],
-        "plateaus": plateaus,
-    }
+        )
+    grows = {"fx": growth["start"].fx, "time_step": growth["time_step"], "predicted_rate": growth["predicted"]}
+    grows |= {"measured": fitted and asdict(fitted), "deviation": fitted and fitted.rate / growth["predicted"] - 1}
+    return {"scene": scene.resolved(), "ramps": ramps, "growth": grows}
 
 
 def report(
-    scene: Scene, runs: list[Onset], growth: GrowthRun, found: Triggered | str, another: list[Onset] | None
+    scene: Scene, runs: list[Onset], growth: Mapping[str, Any], found: Triggered | str, another: list[Onset] | None
 ) -> str:
     """report.md of ramps for each friction coefficient, the run above the onset, and the triggering below it.
 
@@ -352,10 +310,9 @@ def report(
         earlier.append(None if abs(apart) <= one.error + other.error else apart > 0)
     names: dict[str, Any] = {"triggering": None, "dashpot": None}
     if not isinstance(found, str):
-        numbers = triggering_summary(found)
-        names |= {"triggering": found.found, "numbers": numbers, "sensitive": found.sensitive}
-        jump = numbers["jump"]
-        names["jumped"] = jump and float(np.log10(jump / numbers["largest_D"]["perturbed"]))
+        names |= dict(zip(("triggering", "sensitive", "numbers"), found, strict=True))
+        jump = found[2]["jump"]
+        names["jumped"] = jump and float(np.log10(jump / found[2]["largest_D"]["perturbed"]))
     if real is not None and units is not None and units.restitution is not None:
         impact = units.si("impact_velocity") / real.velocity(1.0)
         names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)

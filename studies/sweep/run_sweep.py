@@ -1,22 +1,19 @@
 """Run a sweep: each point is a line of results.jsonl as soon as it ends, and results.csv is the table of all.
 
-`merge` joins the shards of a sweep, each with its own folder.
-
-Points are distributed to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
-workers, on shards, or on interruptions.
+`merge` joins the shards of a sweep, each with its own folder. The table does not depend on the number of workers, on
+shards, or on interruptions.
 
 A folder contains sweep.json (the request, with the version of the program and the keys of the points), results.jsonl
-and results.csv. Points of this sweep with a line in results.jsonl are not computed again, but for points that failed
-for a reason that may have passed (:data:`.workers.FINAL`). A last line that a kill has truncated is computed again. Of
-several rows of a point a good one counts. No line is ever taken out: rows of other scenes, of other code or of another
-version stay in results.jsonl, and are not in the table.
+and results.csv. Points with a line in results.jsonl are not computed again, but for those that failed for a reason that
+may have passed (:data:`.workers.FINAL_ERRORS`). Of several rows of a point a good one counts. No line is ever taken
+out: rows of other scenes, of other code or of another version stay in results.jsonl, and are not in the table.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor
 from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
@@ -38,9 +35,14 @@ from ...pywrap import SceneError
 from ..result_rows import Row, append_row, check_table, read_keyed_rows, write_tables
 from ..study import Progress, Say
 from .sweep_plan import Sweep, points_of
+from .user_function import locate
 from .workers import compute_points, open_executor
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
+
+
+class WorkerError(FaultgougeError):
+    """Workers are killed before they have a row, or end as they start."""
 
 
 class FailedSweepError(FaultgougeError):
@@ -131,39 +133,44 @@ def run_sweep(
     OutputError
         If another process writes to the folder.
     WorkerError
-        If workers are killed repeatedly.
+        If a worker is killed before any row of this call is known; else the sweep goes on with new workers.
     """
-    points = points_of(sweep.points, part)
-    with open_executor(workers, executor) as pool:
-        if MPI.COMM_WORLD.rank != 0:
-            return []
-        make_folder(output, REQUEST_FILE)
-        check_table(sweep.names, output)
-        with lock_output(output):
-            known = read_results(output / RESULTS_FILE)
-            answered = {key for key, row in known.items() if row["says"] is None or row["final"]}
-            missing = [point for point in points if point.key not in answered]
-            # the keys recognise the rows wherever the files of the scenes and of the task are
-            keys = [point.key for point in sweep.points]
-            about = {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
-            write_json(output / REQUEST_FILE, sweep.as_dict() | about)
-            if len(missing) < len(points):
-                say(f"{len(points) - len(missing)} of {len(points)} points are in {output / RESULTS_FILE} already")
-            if others := known.keys() - set(keys):
-                say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
-            with closing(compute_points(pool, sweep.located_task, missing)) as ended:
-                for row in progress(_store(ended, output / RESULTS_FILE), len(missing)):
-                    known[row["key"]] = row
-            table = [known[point.key] for point in points]
-            write_tables(table, sweep.names, output)
-    return table
-
-
-def _store(rows: Iterable[Row], path: Path) -> Iterator[Row]:
-    """Rows as they come, each in the file before it is handed on."""
-    for row in rows:
-        append_row(path, {FORMAT_KEY: FORMAT, **row})
-        yield row
+    points, new = points_of(sweep.points, part), list[Row]()
+    try:
+        with open_executor(workers, executor) as pool:
+            if MPI.COMM_WORLD.rank != 0:
+                return []
+            make_folder(output, REQUEST_FILE)
+            check_table(sweep.names, output)
+            with lock_output(output):
+                known = read_results(output / RESULTS_FILE)
+                answered = {key for key, row in known.items() if row["says"] is None or row["final"]}
+                missing = [point for point in points if point.key not in answered]
+                # the keys recognise the rows wherever the files of the scenes and of the task are
+                keys = [point.key for point in sweep.points]
+                about = {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
+                write_json(output / REQUEST_FILE, sweep.as_dict() | about)
+                if len(missing) < len(points):
+                    say(f"{len(points) - len(missing)} of {len(points)} points are in {output / RESULTS_FILE} already")
+                if others := known.keys() - set(keys):
+                    say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
+                with closing(compute_points(pool, locate(sweep.task, sweep.folder), missing)) as ended:
+                    for row in progress(ended, len(missing)):
+                        append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
+                        known[row["key"]] = row
+                        new.append(row)
+                table = [known[point.key] for point in points]
+                write_tables(table, sweep.names, output)
+        return table
+    except BrokenExecutor:
+        if not new:
+            raise WorkerError(
+                "a worker was killed, possibly for lack of memory: give fewer --workers, and the same command "
+                "continues. Workers also end as they start where a script calls run_sweep above the line `if __name__ "
+                '== "__main__":`, since each of them reads the script anew'
+            ) from None
+        say("a worker was killed, possibly for lack of memory: the sweep goes on with new ones")
+        return run_sweep(sweep, output, part, say, progress, workers, executor)
 
 
 def require_result(rows: Sequence[Row]) -> None:
@@ -194,15 +201,14 @@ def read_results(*paths: Path) -> dict[str, Row]:
     for path in paths:
         for row in read_keyed_rows(path, ("key", "values", "says", "final", "result"), "a sweep"):
             key, known = row["key"], rows.get(row["key"])
-            if known is not None and known["says"] is None:
-                if row["says"] is None and _as_text(row["result"]) != _as_text(known["result"]):
-                    values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
-                    raise SceneError(
-                        f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
-                        "line of the wrong one out"
-                    )
-                continue
-            rows[key], places[key] = row, path
+            if known is None or known["says"] is not None:
+                rows[key], places[key] = row, path
+            elif row["says"] is None and _as_text(row["result"]) != _as_text(known["result"]):
+                values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
+                raise SceneError(
+                    f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
+                    "line of the wrong one out"
+                )
     return rows
 
 
@@ -236,44 +242,44 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
     """
     request = _common_request(parts)
     make_folder(output, REQUEST_FILE)
+    file = output / RESULTS_FILE
     with lock_output(output):
-        if (output / REQUEST_FILE).exists() or (output / RESULTS_FILE).exists():
+        if (output / REQUEST_FILE).exists() or file.exists():
             _common_request([*parts, output])
-        kept = read_results(output / RESULTS_FILE)
-        known = read_results(output / RESULTS_FILE, *(part / RESULTS_FILE for part in parts))
+        kept = read_results(file)
+        known = read_results(file, *(part / RESULTS_FILE for part in parts))
         table = [known[key] for key in request["keys"] if key in known]
         write_json(output / REQUEST_FILE, request | {"shard": [1, 1]})
         for row in table:
             if _as_text(kept.get(row["key"])) != _as_text(row):
-                append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
+                append_row(file, {FORMAT_KEY: FORMAT, **row})
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
-    count = len(request["keys"])
-    say(f"{len(table)} of {count} scenes from {len(parts)} folders; written: {output}/results.csv")
-    if len(table) < count:
-        say(f"the other {count - len(table)} are in none of them: `faultgouge sweep` goes on from here")
+    count, missing = len(request["keys"]), len(request["keys"]) - len(table)
+    says = f"{len(table)} of {count} scenes from {len(parts)} folders; written: {output}/results.csv"
+    say(f"{says}\nthe other {missing} are in none of them: `faultgouge sweep` goes on from here" if missing else says)
     return sweep, table
 
 
 def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
-    """What sweep.json holds in the folders of one sweep, whose shards may differ; SceneError if the requests differ, or
-    a folder is none of a sweep."""
-    asked = list[dict[str, Any]]()
+    """What sweep.json holds in the folders of one sweep, whose shards may differ."""
+    first: dict[str, Any] | None = None
     for folder in folders:
         path = folder / REQUEST_FILE
         try:
             request = dict(json.loads(read_plain_text(path)))
             check_format(request.pop(FORMAT_KEY, None), path)
-            asked.append({name: request[name] for name in ("version", "task", "sweep", "keys", "scene")} | request)
+            same = {name: request[name] for name in ("version", "task", "sweep", "keys")}
+            first = first or same | {"scene": request["scene"]} | request
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
             raise SceneError(
                 f"{folder} is no folder of a sweep, or of version 1.0.0 or before ({type(error).__name__}: {error}): "
                 "give folders of `faultgouge sweep`"
             ) from None
-        for name in ("version", "task", "sweep", "keys"):
-            if request[name] != asked[0][name]:
+        for name, value in same.items():
+            if value != first[name]:
                 raise SceneError(
                     f"{folder} is of another sweep than {folders[0]}, of other scenes, other code or another version "
                     f"({name} differs): merge parts of one sweep, into a new folder or one of this sweep"
                 )
-    return asked[0]
+    return first or {}

@@ -33,6 +33,9 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.validation import read_toml
 from .user_function import locate, user_function
 
+CHAOTIC = """settling is chaotic, so that a seed may be another packing at each value, and differences between values \
+are those of packings, too: compare many seeds, or settle at one load with packing.settle_at"""
+
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
 
@@ -66,10 +69,8 @@ class SweepPoint:
         """Digest of all keys on which settling depends; points with the same digest share the settled packing."""
         if self.scene is None:
             return self.key
-        resolved = with_contents(self.scene)
-        for section in ("ramp", "friction", "output"):
-            resolved.pop(section, None)
-        resolved["perturb"] = self.scene.inertia_factor
+        resolved = with_contents(self.scene) | {"perturb": self.scene.inertia_factor}
+        resolved |= dict.fromkeys(("ramp", "friction", "output"))
         if not resolved["packing"].get("settle_friction", False):
             resolved["law"].pop("mu")
         return digest(resolved)
@@ -122,20 +123,19 @@ class Sweep:
         Relative names of files count from `folder`.
         """
         task, axes, scene = mapping.get("task"), mapping.get("sweep", {}), mapping.get("scene", {})
+        own, wrong = isinstance(task, str) and ":" in task, ""
         if unknown := sorted(mapping.keys() - {"task", "sweep", "scene"}):
-            raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
-        own = isinstance(task, str) and ":" in task
-        if not own and task not in registered.tasks():
-            raise SceneError(
-                f"{name}: task = {task!r} is refused: give one of {', '.join(registered.tasks())}, or a function of "
-                'yours as "file.py:function".'
-            )
+            wrong = f"{unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION]."
+        elif not own and task not in registered.tasks():
+            known = ", ".join(registered.tasks())
+            wrong = f'task = {task!r} is refused: give one of {known}, or a function of yours as "file.py:function".'
         for section, given in (("sweep", axes), ("scene", scene)):
             if not isinstance(given, Mapping):
-                raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
+                wrong = wrong or f"{section} is not a section: write [{section}] and its keys below."
+        if wrong:
+            raise SceneError(f"{name}: {wrong}")
         values = {key: _values(key, each, name) for key, each in axes.items()}
-        count = prod(map(len, values.values()))
-        if count > MOST_POINTS:
+        if (count := prod(map(len, values.values()))) > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
         code = user_function(locate(str(task), folder)).code if own else ""
         sweep = cls(str(task), values, dict(scene), code, folder)
@@ -143,11 +143,6 @@ class Sweep:
         if all(point.says is not None for point in sweep.points):
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
         return sweep
-
-    @property
-    def located_task(self) -> str:
-        """The task, with the path of its file from the root if it is a function of a file."""
-        return locate(self.task, self.folder) if self.code else self.task
 
     @property
     def names(self) -> list[str]:
@@ -159,12 +154,12 @@ class Sweep:
         """Every point, in the order of the table."""
         # a user's function is known by its name and code, without its folder
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
-        known_as, points = (task, version("faultgouge")), list[SweepPoint]()
+        points = []
         for number, chosen in enumerate(product(*self.axes.values())):
             values: dict[str, Any] = {}
             for key, value in zip(self.axes, chosen, strict=True):
                 names = _split_keys(key)
-                values.update(zip(names, value if len(names) > 1 else [value], strict=True))
+                values |= zip(names, value if len(names) > 1 else [value], strict=True)
             mapping = {name: dict(part) if isinstance(part, Mapping) else part for name, part in self.scene.items()}
             for name, value in values.items():
                 section, _, key = name.rpartition(".")
@@ -175,7 +170,8 @@ class Sweep:
                 mapping = with_contents(scene)
             except SceneError as error:
                 says = str(error).removeprefix("scene: ")
-            points.append(SweepPoint(number, values, scene, says, digest([*known_as, mapping])))
+            key = digest([task, version("faultgouge"), mapping])
+            points.append(SweepPoint(number, values, scene, says, key))
         return tuple(points)
 
     def as_dict(self) -> dict[str, Any]:
@@ -185,11 +181,8 @@ class Sweep:
 
 def points_of(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepPoint, ...]:
     """Part K of N of the points, counted from 1: whole settlings, so that no two parts settle the same packing."""
-    mine, of = part
-    order: dict[str, int] = {}
-    for point in points:
-        order.setdefault(point.settling_key, len(order))
-    return tuple(point for point in points if order[point.settling_key] % of == mine - 1)
+    order = {key: place for place, key in enumerate(dict.fromkeys(point.settling_key for point in points))}
+    return tuple(point for point in points if order[point.settling_key] % part[1] == part[0] - 1)
 
 
 def with_contents(scene: Scene) -> dict[str, Any]:
@@ -212,37 +205,28 @@ def _split_keys(key: str) -> list[str]:
 
 def _values(key: str, values: Any, name: str) -> list[Any]:
     """The values of a swept key: the elements of a list, or the whole numbers of "FIRST:LAST"."""
-    names = _split_keys(key)
-    match = re.fullmatch(r"\s*(\d{1,7})\s*:\s*(\d{1,7})\s*", values) if isinstance(values, str) else None
-    if match:
+    if isinstance(values, str) and (match := re.fullmatch(r"\s*(\d{1,7})\s*:\s*(\d{1,7})\s*", values)):
         values = list(range(int(match[1]), int(match[2]) + 1))
     if not isinstance(values, list) or not values:
         raise SceneError(
             f'{name}: "{key}" = {values!r} is refused: give a list of values, or a range "FIRST:LAST", both included.'
         )
-    if len(names) > 1 and not all(isinstance(each, list) and len(each) == len(names) for each in values):
-        raise SceneError(f'{name}: "{key}" names {len(names)} keys: each value is a list of {len(names)}.')
+    count = len(_split_keys(key))
+    if count > 1 and not all(isinstance(each, list) and len(each) == count for each in values):
+        raise SceneError(f'{name}: "{key}" names {count} keys: each value is a list of {count}.')
     return values
 
 
 def other_packings(sweep: Sweep) -> str | None:
     """A sentence that names the swept keys by which a seed may be another packing at each value; None without any.
 
-    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A sweep over load.fy or law.kn
-    compares packings that have only their loose start in common; with `settle_friction`, so does a sweep over friction.
-    Packings that settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored
-    packings have no seed.
+    Settling amplifies the last digit of its load and of its stiffness; with `settle_friction`, of the friction, too.
+    Packings that settle at a load of reference (`settle_at`) and are carried to other loads remain one packing.
     """
     packing = sweep.scene.get("packing", {})
     at, frictional = packing.get("settle_at", {}), packing.get("settle_friction", False)
-    settles = {"load.fy": "fy" not in at, "units.overburden": "fy" not in at, "law.kn": "kn" not in at}
-    settles |= {"law.mu": frictional, "law.kt": frictional, "law.exponent": True}
-    others = "kn" not in at  # of [units], k_n follows from them
-    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and others)]
-    if not keys or "file" in packing:
-        return None
-    return (
-        f"{', '.join(keys)}: settling is chaotic, so that a seed may be another packing at each value, and "
-        "differences between values are those of packings, too: compare many seeds, or settle at one load with "
-        "packing.settle_at"
-    )
+    load, stiffness = "fy" not in at, "kn" not in at  # of [units], k_n follows from all keys but the overburden
+    settles = {"load.fy": load, "units.overburden": load, "law.kn": stiffness, "law.exponent": True}
+    settles |= {"law.mu": frictional, "law.kt": frictional}
+    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and stiffness)]
+    return None if not keys or "file" in packing else f"{', '.join(keys)}: {CHAOTIC}"

@@ -23,6 +23,7 @@ import json
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.machinery import SourceFileLoader
@@ -34,6 +35,8 @@ from ...analysis import FaultgougeError
 from ...analysis.errors import place_in_user_code
 from ...pywrap import Scene, SceneError
 from ..packing_tools import Start
+
+POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
 class UserFunctionError(FaultgougeError):
@@ -58,10 +61,9 @@ class UserFunction(NamedTuple):
         except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
             says = f"{name} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
             raise UserFunctionError(says) from error
-        try:
+        plain = None
+        with suppress(AttributeError, TypeError, ValueError):
             plain = json.loads(json.dumps(row, default=lambda value: value.tolist()))
-        except (AttributeError, TypeError, ValueError) as error:
-            plain = error
         if not isinstance(plain, dict):
             raise UserFunctionError(f"{name} returned {row!r:.60}: return a dict of numbers, words and lists")
         return plain
@@ -75,10 +77,7 @@ def locate(task: str, folder: Path) -> str:
 
 @cache
 def user_function(name: str) -> UserFunction:
-    """The function of a located name.
-
-    Raises SceneError if there is no such file, module or function, or it cannot be called with a scene.
-    """
+    """The function of a located name; SceneError if there is none, or it cannot be called with a scene."""
     place, _, wanted = name.rpartition(":")
     try:
         module = _import_file(Path(place)) if place.endswith(".py") else import_module(place)
@@ -88,9 +87,8 @@ def user_function(name: str) -> UserFunction:
     function = getattr(module, wanted, None)
     if not callable(function):
         raise SceneError(f'task = "{name}": {place} has no function {wanted}: name one that it defines')
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     parameters = inspect.signature(function).parameters.values()
-    count = sum(each.kind in kinds and each.default is inspect.Parameter.empty for each in parameters)
+    count = sum(each.kind in POSITIONAL and each.default is inspect.Parameter.empty for each in parameters)
     if count not in (1, 2):
         raise SceneError(
             f'task = "{name}": {wanted} takes {count} arguments: a task is {wanted}(scene) or {wanted}(scene, settled)'
@@ -115,23 +113,23 @@ def code_digest(module: ModuleType, place: str) -> str:
     """Sixteen hexadecimal digits that stand for the code of a module and of its own modules that it imports, directly
     or not, and wherever in a function; they are read from the text, and nothing is run."""
     file, package = Path(str(module.__file__)), "" if place.endswith(".py") else place.partition(".")[0]
-    folder = file.parents[len(place.split(".")) - (file.name != "__init__.py") if package else 0]
+    root = file.parents[len(place.split(".")) - (file.name != "__init__.py") if package else 0]
     code, waiting = dict[str, str](), [file]
     while waiting:
         each = waiting.pop()
-        if not each.is_file() or (name := str(each.relative_to(folder))) in code:
+        if not each.is_file() or (name := str(each.relative_to(root))) in code:
             continue
         tree = ast.parse(each.read_bytes())
         code[name] = ast.dump(tree)
         for node in ast.walk(tree):
-            at, dotted = folder, list[str]()
+            at, dotted = root, list[str]()
             if isinstance(node, ast.Import):
                 dotted = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom):
-                at = each.parents[node.level - 1] if node.level else folder
+                at = each.parents[node.level - 1] if node.level else root
                 dotted = [f"{node.module or ''}.{alias.name}".strip(".") for alias in node.names]
             for names in (each.split(".") for each in dotted):
-                if at.is_relative_to(folder) and (at != folder or not package or names[0] == package):
+                if at.is_relative_to(root) and (at != root or not package or names[0] == package):
                     # an import of a.b.c runs a, a.b and a.b.c
                     paths = [at.joinpath(*names[: count + 1]) for count in range(len(names))]
                     waiting += [found for path in paths for found in (Path(f"{path}.py"), path / "__init__.py")]

@@ -164,16 +164,10 @@ def test_what_is_rescaled():
 
 
 @both_exponents
-def test_curvature_and_inverse(exponent):
+def test_overlap_of_a_force(exponent):
     law, overlap = MindlinLaw(2e5, 6e4, 0.8, exponent), np.array(OVERLAPS)
-    force = law.normal_force(overlap)
     # 2/3 is rounded, and an error of the power counts |log(force/kn)| = 31 times
-    np.testing.assert_allclose([law.overlap_of_force(f) for f in force], overlap, rtol=4e-15)
-    with mpmath.workdps(40):
-        curvature = [
-            mpmath.diff(lambda v: plain_force(law.kn, 0, 0, v, 0, mpmath.mpf(exponent))[0], d, 2) for d in overlap
-        ]
-    np.testing.assert_allclose(law.normal_curvature(overlap), np.array(curvature, float), rtol=1e-14, atol=1e-9)
+    np.testing.assert_allclose([law.overlap_of_force(f) for f in law.normal_force(overlap)], overlap, rtol=4e-15)
 
 
 @both_exponents
@@ -193,7 +187,7 @@ def test_contacts_that_slide_or_are_open_have_no_dashpots(exponent):
 @pytest.mark.parametrize(
     ("field", "values"),
     [
-        ("kn", (0.0, -1.0, np.nan)),
+        ("kn", (0.0, -1.0, np.nan, 1e300)),
         ("kt", (-1.0, np.inf)),
         ("mu", (-0.1,)),
         ("exponent", (1.25, 0.0, np.nan)),

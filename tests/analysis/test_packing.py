@@ -57,7 +57,7 @@ def test_a_packing_is_frozen(cluster):
 @pytest.mark.parametrize(
     ("i", "j", "slip", "says"),
     [
-        ([0, 1], [1], [0, 0], "shape"),
+        ([0, 1], [1], [0, 0], "2 integers"),
         ([0], [1], [np.nan], "finite"),
         ([-1], [1], [0], "negative"),
         ([0], [-2], [0], "negative"),

@@ -16,6 +16,6 @@ def beyond(tmp_path_factory, faultgouge_here_in):
     """A folder with ramp.h5 beyond the onset and its dumps, and perturb.h5, the undamped run with its trajectory."""
     made = tmp_path_factory.mktemp("beyond")
     (made / "scene.toml").write_text(LAYER + toml(BEYOND_ITS_ONSET))
-    for command in ("ramp", "perturb"):
-        faultgouge_here_in(made, command, "scene.toml", "-o", f"{command}.h5")
+    for command, result in (("ramp", "F_x = 0.024 reached"), ("perturb", "F_x = 0.024, mu = 1: D = ")):
+        assert faultgouge_here_in(made, command, "scene.toml", "-o", f"{command}.h5").stdout.startswith(result)
     return made

@@ -13,23 +13,56 @@ from faultgouge.analysis.files.configuration_file import read_configuration
 from faultgouge.pywrap.lammps.instance import lammps_instance
 
 
+@pytest.fixture
+def taken(faultgouge_here, tmp_path):
+    """Imports a deck; what the command says, and the configuration that it has stored."""
+
+    def take(text: str, *words: str, name: str = "pile"):
+        (tmp_path / f"{name}.in").write_text(text)
+        said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", *words).stdout
+        return said, read_configuration(tmp_path / f"{name}.h5")
+
+    return take
+
+
+@pytest.fixture
+def not_taken(faultgouge_here, tmp_path):
+    """Imports a deck that is refused; the error."""
+
+    def take(text: str, *words: str, name: str = "pile", code: int = 1):
+        (tmp_path / f"{name}.in").write_text(text)
+        return faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", *words, code=code).stderr
+
+    return take
+
+
+PILE = {word: DECK.format(**ROUND, word=word) for word in ("contacts", "")}
+DISKS = DECK.format(**FLAT, word="contacts")
+SPRINGS = "hertz/history ${kn} NULL 10 NULL 0.9 1"
+
+
+def of_granular(law: str) -> str:
+    """The pile of spheres with a law of `granular`."""
+    deck = (
+        PILE[""]
+        .replace(f"pair_style gran/{SPRINGS}", "pair_style granular")
+        .replace(f"gran {SPRINGS}", f"gran granular {law}")
+    )
+    return deck.replace("pair_coeff * *", f"pair_coeff * * {law}")
+
+
 @pytest.mark.parametrize("shape", [FLAT, ROUND], ids=["disks", "spheres"])
-def test_deck(faultgouge_here, tmp_path, shape):
+def test_deck(faultgouge_here, taken, tmp_path, shape):
     from faultgouge.analysis import eigenvalues
 
-    folder = tmp_path / "own"
-    folder.mkdir()
-    (folder / "pile.in").write_text(DECK.format(**shape, word="contacts"))
-    done = faultgouge_here("import", "own/pile.in", "-o", "pile.h5")
-    assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in done.stdout
-    configuration = read_configuration(tmp_path / "pile.h5")
+    (tmp_path / "own").mkdir()
+    said, configuration = taken(DECK.format(**shape, word="contacts"), name="own/pile")
+    (tmp_path / "own" / "pile.h5").rename(tmp_path / "pile.h5")
+    assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in said
     assert configuration.residual < 1e-6
-    found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)
-    assert [complex(*each) for each in found["eigenvalues"]] == pytest.approx(
-        list(eigenvalues(configuration)), abs=1e-8
-    )
+    found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)["eigenvalues"]
+    assert [complex(*each) for each in found] == pytest.approx(list(eigenvalues(configuration)), abs=1e-8)
     assert "as LAMMPS left them" in faultgouge_here("spectrum", "pile.h5").stdout
-    assert "has no upper layer" in faultgouge_here("spectrum", "pile.h5", "--rise", code=2).stderr
 
     faultgouge_here("export", "pile.h5", "--mode", "1", "-o", "pile.vtp")
     piece = ElementTree.parse(tmp_path / "pile.vtp").find(".//Piece")
@@ -46,29 +79,27 @@ def test_deck(faultgouge_here, tmp_path, shape):
     lammps.close()
     assert np.array_equal(place[np.argsort(order), : configuration.dimension], configuration.position)
     np.testing.assert_allclose(mass.ravel()[np.argsort(order)], configuration.mass, rtol=1e-15)
-    assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
     assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
+    refusals = [("spectrum", "--rise", "has no upper layer"), ("movie", "nothing moves in it")]
     if shape is ROUND:
-        assert "a film shows disks" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
-        too_large = faultgouge_here("export", "pile.h5", "--mode", "99", "-o", "pile.vtp", code=2).stderr
-        assert "15 modes, counted from 0" in too_large
-        return
-    assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
+        refusals.append(("movie", "--mode", "0", "a film shows disks"))
+        refusals.append(("export", "--mode", "99", "-o", "pile.vtp", "15 modes, counted from 0"))
+    else:
+        assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
+    for command, *words, says in refusals:
+        assert says in faultgouge_here(command, "pile.h5", *words, code=None if not words else 2).stderr
 
 
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
 
 
 @pytest.mark.parametrize("walls", [1, 2])
-def test_walls_that_hand_out_no_contacts(faultgouge_here, tmp_path, walls):
+def test_walls_that_hand_out_no_contacts(taken, walls):
     """The word `contacts` changes no motion, and the contacts are found without it, in a corner of two walls, too."""
     found = {}
     for word in ("contacts", ""):
-        deck = DECK if walls == 1 else DECK.replace("fix move", SIDE)
-        shape = ROUND if walls == 1 else ROUND | {"down": "-0.3 0 -1"}
-        (tmp_path / f"pile{word}.in").write_text(deck.format(**shape, word=word))
-        faultgouge_here("import", f"pile{word}.in", "-o", f"pile{word}.h5")
-        found[word] = read_configuration(tmp_path / f"pile{word}.h5")
+        deck, shape = (DECK, ROUND) if walls == 1 else (DECK.replace("fix move", SIDE), ROUND | {"down": "-0.3 0 -1"})
+        _, found[word] = taken(deck.format(**shape, word=word), name=f"pile{word}")
     one, other = (found[word].contacts for word in ("contacts", ""))
     assert found[""].operators == "laws"
     assert np.array_equal(one.i, other.i)
@@ -107,82 +138,72 @@ run {steps}
 LAW = "hertz 2e3 10 tangential mindlin 1.5e3 1 0.5 rolling sds 100 {g} 0.2"
 
 
-def test_what_has_been_poured_comes_to_rest(faultgouge_here, tmp_path):
+def pour(g=1, rise: object = 0.0) -> str:
+    return POUR.format(law=LAW.format(g=g), rise=rise, steps=6000)
+
+
+def test_what_has_been_poured_comes_to_rest(taken, not_taken):
     """A deck that ends while its particles move, with fix pour, which lets no time step be changed; and with a region
     that may move, but stays."""
-    deck = POUR.format(law=LAW.format(g=1), rise=0.0, steps=6000)
-    (tmp_path / "pour.in").write_text(deck)
-    said = faultgouge_here("import", "pour.in", "-o", "pour.h5", code=1).stderr
+    said = not_taken(pour())
     assert "The packing moves: the residual of particle" in said
     assert "bring it to rest by faultgouge.relax(lmp), in a command --relax, or" in said
-    faultgouge_here("import", "pour.in", "-o", "pour.h5", "--relax")
-    found = read_configuration(tmp_path / "pour.h5")
-    assert len(found) == 5
-    assert found.operators == "differences"
-    weight = float(found.mass.mean())
-    assert found.residual < 1e-7 * weight
+    _, found = taken(pour(), "--relax")
+    assert (len(found), found.operators) == (5, "differences")
+    assert found.residual < 1e-7 * found.mass.mean()
     assert found.proof < 1e-5
 
 
-def test_a_run_that_fix_halt_has_ended(faultgouge_here, tmp_path):
+def test_a_run_that_fix_halt_has_ended(taken, not_taken):
     """LAMMPS skips all further runs; the particles come to rest all the same."""
     halted = "variable now equal step\nfix stop all halt 10 v_now > 1500 error soft message no\nrun 6000"
-    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="").replace("run 6000", halted))
-    assert "The packing moves" in faultgouge_here("import", "pile.in", "-o", "pile.h5", code=1).stderr
-    faultgouge_here("import", "pile.in", "-o", "pile.h5", "--relax")
-    assert read_configuration(tmp_path / "pile.h5").residual < 1e-8
+    deck = PILE[""].replace("run 6000", halted)
+    assert "The packing moves" in not_taken(deck)
+    assert taken(deck, "--relax")[1].residual < 1e-8
 
 
-def test_a_deck_without_particles(faultgouge_here, tmp_path):
+def test_a_deck_without_particles(not_taken, tmp_path):
     """There is no state to keep."""
-    lines = [line for line in DECK.format(**ROUND, word="").splitlines() if "create_atoms" not in line]
-    (tmp_path / "none.in").write_text("\n".join(line for line in lines if not line.startswith("set ")))
-    said = faultgouge_here("import", "none.in", "-o", "none.h5", code=1).stderr
+    said = not_taken(re.sub("(?m)^(create_atoms|set) .*\n", "", PILE[""]))
     assert "This LAMMPS has no particles. No state is kept, as there are no particles.\n" in said
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["log.lammps", "none.in"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["log.lammps", "pile.in"]
 
 
 @pytest.mark.ranks
-def test_a_deck_on_two_ranks(faultgouge, faultgouge_here, tmp_path):
+def test_a_deck_on_two_ranks(faultgouge, taken, tmp_path):
     """A look needs a copy of the process. What several ranks have run is taken by a process of one, a step on."""
-    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word=""))
+    _, one = taken(PILE[""])
     assert "3 spheres, " in faultgouge("import", "pile.in", "-o", "two.h5", ranks=2).stdout
-    faultgouge_here("import", "pile.in", "-o", "one.h5")
-    two, one = (read_configuration(tmp_path / f"{name}.h5") for name in ("two", "one"))
+    two = read_configuration(tmp_path / "two.h5")
     assert two.position == pytest.approx(one.position, abs=1e-9)
     assert two.contacts.tangential_force == pytest.approx(one.contacts.tangential_force, abs=1e-7)
     assert "one step after the end of the deck on 2 ranks" in two.remarks[-1]
 
 
-def test_regions_that_move(faultgouge_here, tmp_path):
+def test_regions_that_move(not_taken):
     """A part of an intersection that rises with the time: its place is another one in each run."""
-    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=6000))
     for more in ((), ("--relax",)):
-        said = faultgouge_here("import", "pour.in", *more, code=1).stderr
+        said = not_taken(pour(rise="1e-6*elapsed"), *more)
         assert "LAMMPS's forces change with the time, though nothing moves: a load, a wall or a region follows" in said
 
 
-def test_a_line_at_which_lammps_stops(faultgouge_here, tmp_path):
+def test_a_line_at_which_lammps_stops(faultgouge_here, not_taken, tmp_path):
     """The state of the runs before it is kept."""
-    deck = DECK.format(**ROUND, word="contacts").replace("run 6000", "run 1500\ncompute what all no/such/style")
-    (tmp_path / "stops.in").write_text(deck)
-    said = faultgouge_here("import", "stops.in", "-o", "stops.h5", code=1).stderr
+    deck = PILE["contacts"].replace("run 6000", "run 1500\ncompute what all no/such/style")
+    said = not_taken(deck, name="stops")
     assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
     assert "is kept in stops.restart, and the deck stops.restart.in beside it goes on from there" in said
     assert "3 spheres, " in faultgouge_here("import", "stops.restart", "--relax", "-o", "stops.h5").stdout
-    (tmp_path / "lost.in").write_text(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"))
-    said = faultgouge_here("import", "lost.in", "-o", "lost.h5", code=1).stderr
+    said = not_taken(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"), name="lost")
     assert "Lost atoms: original 3 current 0" in said
     assert "The state is not kept: LAMMPS stopped: Lost atoms" in said
     assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 
 @pytest.mark.long
-def test_time_step_with_which_nothing_rests(faultgouge_here, tmp_path):
+def test_time_step_with_which_nothing_rests(not_taken):
     """Rolling dashpots stronger than the time step allows: spheres vibrate for ever, as their friction bounds it."""
-    deck = POUR.format(law=LAW.format(g=500), rise=0.0, steps=6000)
-    (tmp_path / "pour.in").write_text(deck.replace("pour 5", "pour 8"))
-    said = faultgouge_here("import", "pour.in", "--relax", code=1).stderr
+    said = not_taken(pour(g=500).replace("pour 5", "pour 8"), "--relax")
     found = re.search(r"its time step 0.002 is longer than the largest stable one, (\S+), of its contacts", said)
     assert 1e-5 < float(found[1]) < 0.002
 
@@ -190,35 +211,22 @@ def test_time_step_with_which_nothing_rests(faultgouge_here, tmp_path):
 COHESIVE = "jkr 1e3 0.05 0.3 10 tangential mindlin 800 1 0.5 rolling sds 100 1 0.2"
 
 
-def test_any_model_in_a_region(faultgouge_here, tmp_path):
+def test_any_model_in_a_region(faultgouge_here, taken):
     """K and C by differences of forces, and the command says so, with the time step."""
-    from faultgouge.analysis.files.configuration_file import read_configuration
-
-    deck = DECK.format(**ROUND, word="").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
-    deck = deck.replace("pair_coeff * *", f"pair_coeff * * {COHESIVE}")
-    lines = [line for line in deck.splitlines() if not line.startswith("fix floor")]
     bowl = f"region bowl sphere 0 0 3 3 side in\nfix bowl all wall/gran/region granular {COHESIVE} region bowl"
-    deck = "\n".join(lines).replace("fix drag", f"{bowl}\nfix drag").replace("run 6000", "run 30000")
-    (tmp_path / "glue.in").write_text(deck)
-    said = faultgouge_here("import", "glue.in", "-o", "glue.h5").stdout
-    assert "3 spheres, " in said
-    assert "K and C by differences of forces to " in said
-    assert "largest stable time step " in said
-    found = read_configuration(tmp_path / "glue.h5")
+    deck = re.sub("(?m)^fix floor .*$", bowl, of_granular(COHESIVE)).replace("run 6000", "run 30000")
+    said, found = taken(deck)
+    for words in ("3 spheres, ", "K and C by differences of forces to ", "largest stable time step "):
+        assert words in said
     assert found.operators == "differences"
     assert found.operator_error < 1e-5
-    assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "glue.h5", "--json").stdout)
-    faultgouge_here("export", "glue.h5", "--mode", "1", "-o", "glue.vtp")
+    assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)
+    faultgouge_here("export", "pile.h5", "--mode", "1", "-o", "pile.vtp")
 
 
-def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
+def test_time_step_beside_rayleighs(taken):
     """Young's modulus 1e3, Poisson's ratio 0.25: G = 400, and Rayleigh's step is pi R sqrt(rho/G) / 0.9174."""
-    deck = DECK.format(**ROUND, word="contacts").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
-    law = "hertz/material 1e3 10 0.25 tangential mindlin NULL 1 0.9"
-    deck = deck.replace("pair_coeff * *", f"pair_coeff * * {law}")
-    deck = deck.replace("wall/gran hertz/history ${kn} NULL 10 NULL 0.9 1", f"wall/gran granular {law}")
-    (tmp_path / "pile.in").write_text(deck)
-    said = faultgouge_here("import", "pile.in", "-o", "pile.h5").stdout
+    said, _ = taken(of_granular("hertz/material 1e3 10 0.25 tangential mindlin NULL 1 0.9"))
     assert re.search(r"^(stable|unstable): ", said, re.MULTILINE)
     step, share, usual = map(float, re.search(r"step (\S+), (\S+) of Rayleigh's formula \((\S+)\)", said).groups())
     assert usual == pytest.approx(np.pi * 0.5 / np.sqrt(400) / (0.1631 * 0.25 + 0.8766), rel=1e-3)
@@ -226,90 +234,73 @@ def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["short", "ü 5% of $x & *"])
-def test_a_state_that_moves_is_kept(faultgouge, faultgouge_here, tmp_path, name):
+def test_a_state_that_moves_is_kept(faultgouge_here, taken, tmp_path, name):
     """Where the run was too short, the restart goes on as the deck itself does, tangential histories and all. No file
     of the user's is touched: not a restart of the same name, nor one of a row that the deck writes."""
-    deck = DECK.format(**ROUND, word="contacts")
+    deck = PILE["contacts"]
     (tmp_path / f"{name}.in").write_text(deck.replace("run 6000", "restart 1000 short.restart.*\nrun 1500"))
     mine = {"short.restart": b"mine", "short.restart.9000": b"mine, too", "short.2.restart.in": b"a deck"}
     for file, fill in mine.items():
         (tmp_path / file).write_bytes(fill)
-    said = faultgouge("import", f"{name}.in", "-o", f"{name}.h5", code=1).stderr
+    said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", code=1).stderr
     assert re.search(r"The packing moves: the residual of particle [123] at \(", said)
     kept = tmp_path / re.search(r"The state, one step on, is kept in (\S+), and the deck (\S+) beside it", said)[1]
     assert re.fullmatch(r"[A-Za-z0-9_.+-]+", kept.name)
     assert {file: (tmp_path / file).read_bytes() for file in mine} == mine
     assert (tmp_path / "short.restart.1000").is_file()
     assert not (tmp_path / f"{name}.h5").exists()
-    again = faultgouge("import", f"{name}.in", "-o", f"{name}.h5", code=1).stderr
+    again = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", code=1).stderr
     assert f"is kept in {kept.name.replace('.restart', '.1.restart').replace('1.1', '3')}, and" in again
     beside = kept.with_name(f"{kept.name}.in")
     beside.write_text(beside.read_text() + "run 4499\n")
-    faultgouge("import", kept.name, "-o", "on.h5")
-    (tmp_path / "whole.in").write_text(deck)
-    faultgouge_here("import", "whole.in", "-o", "whole.h5")
-    on, whole = (read_configuration(tmp_path / f"{name}.h5") for name in ("on", "whole"))
+    faultgouge_here("import", kept.name, "-o", "on.h5")
+    on, (_, whole) = read_configuration(tmp_path / "on.h5"), taken(deck, name="whole")
     # the first step after a restart has the dashpots of another half step, a force of 1e-4 here
     assert on.position == pytest.approx(whole.position, abs=1e-6)
     tangential = whole.contacts.tangential_force
     assert np.abs(on.contacts.tangential_force - tangential).max() < 1e-3 * np.abs(tangential).max()
 
 
-def test_bare_files_of_lammps(refusal, faultgouge_here, tmp_path):
+def test_bare_files_of_lammps(refusal, taken):
     """A restart or data file without contacts and laws: a deck around it has these."""
     ends = "run 10\nwrite_restart pile.restart\nwrite_data pile.data\n"
-    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="").replace("run 6000", ends))
-    faultgouge_here("import", "pile.in", "--balance", "1e9", "-o", "pile.h5")
-    for kind in ("restart", "data"):
-        assert f"write a deck with {'read_' + kind if kind == 'restart' else 'units lj'}" in refusal(
-            "import", f"pile.{kind}"
-        )
+    taken(PILE[""].replace("run 6000", ends), "--balance", "1e9")
+    for kind, words in (("restart", "read_restart"), ("data", "units lj")):
+        assert f"write a deck with {words}" in refusal("import", f"pile.{kind}")
 
 
-def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
-    far = DECK.format(**FLAT, word="contacts").replace("0.5 0 units", "0.7 0 units").replace("-0.45", "-0.8")
-    far = far.replace("single 0.45", "single 0.8").replace("1.3", "2.5").replace("run 6000", "run 0")
-    (tmp_path / "far.in").write_text(far)
-    assert "3 disks, 0 contacts" in faultgouge_here("import", "far.in", "-o", "far.h5").stdout
-    for words in (("draw", "-o", "far.png"), ("export", "-o", "far.vtp")):
-        command, *output = words
+def test_packing_in_which_nothing_touches(faultgouge_here, taken):
+    far = DISKS.replace("0.5 0 units", "0.7 0 units").replace("0.45", "0.8").replace("1.3", "2.5")
+    said, _ = taken(far.replace("run 6000", "run 0"))
+    assert "3 disks, 0 contacts" in said
+    for command, output in (("draw", "far.png"), ("export", "far.vtp")):
         for mode in ("pair", "0"):
-            says = faultgouge_here(command, "far.h5", "--mode", mode, *output, code=None).stderr
+            says = faultgouge_here(command, "pile.h5", "--mode", mode, "-o", output, code=None).stderr
             assert "the packing has 0 modes" in says
-    assert "no frame 3" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
+    assert "no frame 3" in faultgouge_here("draw", "pile.h5", "--frame", "3", code=2).stderr
 
 
-def two_on_three():
-    """A row of three in a periodic box, and two above."""
-    layers = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
-    body = DECK.format(**FLAT, word="contacts").replace("boundary f", "boundary p")
-    body = body.replace("block -2 2", "block -1.51 1.51").replace("run 6000", "run 20000")
-    lines = [line for line in body.splitlines() if "create_atoms" not in line]
-    at = lines.index("create_box 1 box") + 1
-    lines[at:at] = [f"create_atoms 1 single {x} {y} 0 units box" for x, y in layers]
-    return "\n".join(lines) + "\n"
-
-
-PILE, ROW = DECK.format(**FLAT, word="contacts"), two_on_three()
+# a row of three in a periodic box, and two above
+LAYERS = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
+PLACED = "create_box 1 box\n" + "".join(f"create_atoms 1 single {x} {y} 0 units box\n" for x, y in LAYERS)
+ROW = re.sub("(?m)^create_atoms .*\n", "", DISKS).replace("create_box 1 box\n", PLACED)
+ROW = ROW.replace("boundary f", "boundary p").replace("-2 2", "-1.51 1.51", 1).replace("run 6000", "run 20000")
 LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
 AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
 REFUSED = [
-    ("pile.in --kn 3", PILE, 2, "only -o, --relax and --balance go with it"),
-    ("pile.in --balance nan", PILE, 2, "greater than or equal to 0"),
+    ("pile.in --kn 3", DISKS, 2, "only -o, --relax and --balance go with it"),
+    ("pile.in --balance nan", DISKS, 2, "greater than or equal to 0"),
     ("a.csv --balance 1", "", 2, "--balance is for a LAMMPS deck"),
     ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),
-    ("pile.lammps", PILE, 2, "LAMMPS decks (.in, in.NAME)"),
+    ("pile.lammps", DISKS, 2, "LAMMPS decks (.in, in.NAME)"),
     ("lig.in", "atom_style granular\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", "units si\nhard_particles yes\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", f"{LIGGGHTS}fix m1 all property/global youngsModulus peratomtype 5.e6\n", 1, "of LIGGGHTS, whose"),
-    ("cleared.in", f"{PILE}clear\n", 1, "no pair_style after `clear`, which takes all away"),
-    (
-        "mute.in",
-        f"echo none\n{PILE}",
-        1,
-        "no pair_style: leave `echo none` and `echo log` out",
+    ("cleared.in", f"{DISKS}clear\n", 1, "no pair_style after `clear`, which takes all away"),
+    *(
+        ("mute.in", f"echo {way}\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out")
+        for way in ("none", "log")
     ),
-    ("mute.in", f"echo log\n{PILE}", 1, "no pair_style: leave `echo none` and `echo log` out"),
     # LAMMPS forgets histories there, since the compute has asked for another list of neighbours
     ("lost.in", f"{ROW}{AFTER}", 1, "write_restart, rerun, reset_atoms, and delete_atoms without `compress no`, lose"),
 ]
@@ -325,29 +316,22 @@ def test_what_is_refused_is_said_with_its_cause(faultgouge_here, tmp_path, words
     assert not (tmp_path / "packing.h5").exists()
 
 
-def test_contacts_at_the_bound(faultgouge_here, tmp_path):
+def test_contacts_at_the_bound(faultgouge_here, taken):
     """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
-    deck = two_on_three()
-    (tmp_path / "rough.in").write_text(deck)
-    faultgouge_here("import", "rough.in", "-o", "rough.h5")
-    c = read_configuration(tmp_path / "rough.h5").contacts
+    c = taken(ROW, name="rough")[1].contacts
     used = np.linalg.norm(c.tangential_force, axis=1) / c.normal_force
     mu = used[~c.wall].max() * (1 - 1e-7)
-    (tmp_path / "slid.in").write_text(f"{deck}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n")
-    said = faultgouge_here("import", "slid.in", "-o", "slid.h5").stdout
-    count = int(read_configuration(tmp_path / "slid.h5").contacts.at_bound.sum())
+    said, found = taken(f"{ROW}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n", name="slid")
+    count = int(found.contacts.at_bound.sum())
     assert count > 0
     assert f"{count} at Coulomb's bound, sticking in K" in said
     verdict, *_ = faultgouge_here("spectrum", "slid.h5").stdout.partition("5 disks")
     assert f"{count} of {len(c)} contacts are at Coulomb's bound: each slides on ahead" in verdict
 
 
-def test_a_law_that_is_another_one_than_its_line_says(faultgouge_here, tmp_path):
+def test_a_law_that_is_another_one_than_its_line_says(taken):
     """K has LAMMPS's: the wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025."""
-    deck = DECK.format(**FLAT, word="contacts").replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
-    (tmp_path / "hooke.in").write_text(deck)
-    said = faultgouge_here("import", "hooke.in", "-o", "hooke.h5").stdout
-    found = read_configuration(tmp_path / "hooke.h5")
+    said, found = taken(DISKS.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3"))
     assert found.proof < 1e-5
     assert found.remarks == ("drag of fix drag (viscous) is left out",)
     assert found.remarks[0] in said

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_layer import SMALL, toml
+from reference_layer import SMALL, store, toml
 
 from faultgouge import load
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, RunFile, eigenvalues, spectrum, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, eigenvalues, spectrum, stiffness_matrix
 from faultgouge.analysis.responses.transient import transient_gains
 
 
@@ -18,9 +18,7 @@ def spectrum_of(faultgouge_here, tmp_path):
 
     def run(packing, *more, name="run.h5"):
         if isinstance(packing, Packing):
-            with RunFile.create(tmp_path / name, packing) as file:
-                file.append(packing)
-                file.complete = True
+            store(tmp_path / name, packing)
         words = ("spectrum", name if isinstance(packing, Packing) else packing, *more)
         return faultgouge_here(*words).stdout, json.loads(faultgouge_here(*words, "--json").stdout)
 
@@ -31,7 +29,7 @@ def spectrum_of(faultgouge_here, tmp_path):
 def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves(
     spectrum_of, faultgouge_here, tmp_path
 ):
-    (tmp_path / "scene.toml").write_text(toml(SMALL | {"ramp": {"step": 5e-3, "until": 1e-2}}))
+    (tmp_path / "scene.toml").write_text(toml(SMALL | {"ramp": {"step": 1e-2, "until": 1e-2}}))
     faultgouge_here("ramp", "scene.toml")
     packing = load(tmp_path / "run.h5")
     (said, printed), (lines, fast) = (spectrum_of("run.h5", more) for more in ("--gain", "--values"))
@@ -61,9 +59,7 @@ def test_a_driven_packing_has_its_spring_in_command_and_python_alike(spectrum_of
     packing = reference_packing(1.0)
     drive = {"spring": spring, "velocity": 1e-3, "until": 1.0}
     about = {"task": "drive", "scene": json.dumps({"drive": drive})}
-    with RunFile.create(tmp_path / "drive.h5", packing, about) as file:
-        file.append(packing, time=0.0)
-        file.complete = True
+    store(tmp_path / "drive.h5", packing, about=about, time=0.0)
     _, told = spectrum_of("drive.h5")
     drawn = load(tmp_path / "drive.h5")
     assert told["spring"] == drawn.spring == drawn.configuration.spring == (0.0 if spring == "rigid" else spring)
@@ -104,12 +100,9 @@ STANDS = Packing(
     contacts=Contacts([0, 0], [-1, 1], [0, 0]), law=LAW, box_length=4.0, fy=3.0,
 )  # fmt: skip
 """Two disks on top of each other, in balance and pressed together too far."""
-BESIDE = replace(
-    STANDS,
-    position=[[1.0, 0.5 - OVERLAP], [3.0, 0.5 - OVERLAP]],
-    top=[True, True],
-    contacts=Contacts([0, 1], [-1, -1], [0, 0]),
-)
+FLOOR = {"top": [True, True], "contacts": Contacts([0, 1], [-1, -1], [0, 0])}
+BESIDE = replace(STANDS, position=[[1.0, 0.5 - OVERLAP], [3.0, 0.5 - OVERLAP]], **FLOOR)
+MOVES = replace(BESIDE, position=[[1.0, 0.49], [3.0, 0.49]])
 
 
 @pytest.mark.slow
@@ -117,12 +110,7 @@ BESIDE = replace(
     ("packing", "stable", "first", "says"),
     [
         (STANDS, False, "unstable", "negative eigenvalue -1.50251247"),
-        (
-            replace(BESIDE, position=[[1.0, 0.49], [3.0, 0.49]]),
-            None,
-            "not known whether the packing is stable",
-            "the packing moves: the residual force on a particle is",
-        ),
+        (MOVES, None, "not known whether the packing is stable", "the packing moves: the residual force on a"),
         (BESIDE, True, "stable", "volume fraction"),
     ],
     ids=["buckles", "moves", "side by side"],

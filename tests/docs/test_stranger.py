@@ -57,24 +57,20 @@ def test_readme_shows_what_its_commands_print(installed, environment, tmp_path):
 
 
 def test_the_examples_of_help_run(installed, environment, tmp_path):
-    path = f"{installed[0] / 'bin'}:{environment['PATH']}"
+    environment = environment | {"PATH": f"{installed[0] / 'bin'}:{environment['PATH']}"}
 
     def shell(line, folder):
-        return subprocess.run(
-            ["bash", "-c", line], cwd=folder, env=environment | {"PATH": path}, capture_output=True, text=True,
-            timeout=1800,
-        )  # fmt: skip
+        words = {"capture_output": True, "text": True, "timeout": 1800}
+        return subprocess.run(["bash", "-c", line], cwd=folder, env=environment, **words)
 
-    commands = re.findall(
-        r"^  (\w+)  ", shell("faultgouge --help", tmp_path).stdout.split("Commands:")[1], re.MULTILINE
-    )
+    overview = shell("faultgouge --help", tmp_path).stdout.split("Commands:")[1]
+    commands = re.findall(r"^  (\w+)  ", overview, re.MULTILINE)
     assert len(commands) > 20
     wrong = []
     for command in ["", *commands]:
         shown = " ".join(EXAMPLES.search(shell(f"faultgouge {command} --help", tmp_path).stdout)[1].split())
         for k, example in enumerate(shown.split("; ") if not command else [shown]):
-            folder = tmp_path / f"{command}{k}"
-            folder.mkdir()
+            (folder := tmp_path / f"{command}{k}").mkdir()
             done = shell(example, folder)
             if done.returncode or "Error" in done.stderr:
                 wrong.append(f"{example}: {done.stderr[-300:]}")

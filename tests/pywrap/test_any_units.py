@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_layer import SMALL
+from reference_layer import store
 
 from faultgouge.analysis import MindlinLaw, RunFile
 from faultgouge.pywrap import Scene, perturb, ramp, settle
@@ -19,37 +19,25 @@ UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
 
 def scene(length=1.0, force=1.0, mass=1.0, precision="double", **packing):
     time = (mass * length / force) ** 0.5
-    return Scene.from_mapping(
-        {
-            "precision": precision,
-            "packing": {
-                "disks": 12,
-                "radii": [0.5 * length, 0.7 * length],
-                "width": 4.1 * length,
-                "mass": mass,
-                "seed": 3,
-                **packing,
-            },
-            "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
-            "load": {"fy": 3.0 * force},
-            "ramp": {"step": 2e-3 * force, "until": 4e-3 * force},
-            "perturb": {"fx": 0.0, "time": 0.5 * time, "amplitude": 1e-4 * force, "omega": 1.0 / time},
-        }
-    )
+    own = {"disks": 12, "radii": [0.5 * length, 0.7 * length], "width": 4.1 * length, "mass": mass, "seed": 3}
+    sections = {
+        "packing": own | packing,
+        "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
+        "load": {"fy": 3.0 * force},
+        "ramp": {"step": 2e-3 * force, "until": 4e-3 * force},
+        "perturb": {"fx": 0.0, "time": 0.5 * time, "amplitude": 1e-4 * force, "omega": 1.0 / time},
+    }
+    return Scene.from_mapping({"precision": precision} | sections)
 
 
 def dimensionless(length=1.0, force=1.0, mass=1.0, precision="double"):
     wanted = scene(length, force, mass, precision)
     path = list(ramp(wanted))
     *_, last = perturb(wanted, path[-1], samples=1, early=0)
-    packing = path[-1].packing
-    return {
-        "position": packing.position / length,
-        "slip": packing.contacts.slip / length,
-        "residual": path[-1].residual / force,
-        "msd": last.msd / length**2,
-        "velocity": last.layer_velocity / (length * force / mass) ** 0.5,
-    }
+    packing, velocity = path[-1].packing, (length * force / mass) ** 0.5
+    lengths = {"position": packing.position / length, "slip": packing.contacts.slip / length}
+    moved = {"msd": last.msd / length**2, "velocity": last.layer_velocity / velocity}
+    return lengths | moved | {"residual": path[-1].residual / force}
 
 
 @settings(max_examples=20, deadline=None)
@@ -120,20 +108,17 @@ def test_powers_of_two_change_no_bit():
 
 @cache
 def onset_in(length, force, mass, damped):
-    sections = SMALL | {
-        "packing": SMALL["packing"]
-        | {"width": 6.0 * length, "radii": [0.5 * length, 0.7 * length], "mass": mass, "seed": 2},
+    time, own = (mass * length / force) ** 0.5, {"disks": 30, "top": 5, "width": 6.0 * length, "seed": 2, "mass": mass}
+    sections = {
+        "packing": own | {"radii": [0.5 * length, 0.7 * length]},
         "law": {"kn": 2e5 * force / length**1.5, "mu": 0.5},
         "load": {"fy": 3.0 * force},
         "ramp": {"step": 5e-3 * force, "until": 0.025 * force},
     }
-    time = (mass * length / force) ** 0.5
-    if damped:
-        sections |= {"damping": {"cn": 10.0 * force / length**1.5 * time}}
-        found = onset_run(Scene.from_mapping(sections), 0.5, dissipation=True, first=True)
-        return found.fx_c / force, found.error / force, found.windows[0].frequency * time
-    run = onset_run(Scene.from_mapping(sections), 0.5, first=True)
-    return run.fx_c / force, run.error / force, run.windows[0].eigenvalue * time**2
+    damping = {"damping": {"cn": 10.0 * force / length**1.5 * time}} if damped else {}
+    found = onset_run(Scene.from_mapping(sections | damping), 0.5, dissipation=damped, first=True)
+    first = found.windows[0]
+    return found.fx_c / force, found.error / force, first.frequency * time if damped else first.eigenvalue * time**2
 
 
 EXTREME = [(1e-9, 1.0, 1.0), (1e6, 1.0, 1.0), (1.0, 1e-9, 1.0), (1.0, 1e6, 1.0), (1.0, 1.0, 1e-9), (1.0, 1.0, 1e6)]
@@ -156,9 +141,7 @@ def test_what_is_written_is_read_in_any_units(units, tmp_path, faultgouge_here):
     """Exports come back to the bit, and an import is in balance; draw and view take it."""
     for name, (length, force, mass) in (("own", (1.0, 1.0, 1.0)), ("other", units)):
         packing = settle(scene(length, force, mass)).packing
-        with RunFile.create(tmp_path / f"{name}.h5", packing) as file:
-            file.append(packing)
-            file.complete = True
+        store(tmp_path / f"{name}.h5", packing)
         for suffix in (".xyz", ".data"):
             faultgouge_here("export", f"{name}.h5", "-o", f"{name}{suffix}")
             done = faultgouge_here("import", f"{name}{suffix}", "-o", f"{name}{suffix}.h5").stdout

@@ -7,7 +7,7 @@ from copy import deepcopy
 from pathlib import Path
 
 import pytest
-from reference_layer import REFERENCE
+from reference_layer import REFERENCE, toml
 from table_rows import rows_of
 
 from faultgouge import registered
@@ -67,11 +67,11 @@ def test_every_key_reaches_the_scene_and_the_resolved_scene_gives_the_same(chang
 
 
 @pytest.mark.parametrize(
-    ("kt", "number"),
+    ("text", "number"),
     [("2/7 kn", 57142.857142857145), ("0.5 kn", 1e5), ("1e-1 kn", 2e4), ("kn", 2e5), (0, 0.0), (57000, 57000.0)],
 )
-def test_kt_is_a_number_or_a_share_of_kn(kt, number):
-    assert Scene.from_mapping(merge_changes({"law.kt": kt})).law.kt == number
+def test_a_stiffness_is_a_number_or_a_share_of_another(text, number):
+    assert Scene.from_mapping(merge_changes({"law.kt": text})).law.kt == number
     assert Scene.from_mapping(LEAST).law.kt == 57142.857142857145
 
 
@@ -90,20 +90,16 @@ def test_shipped_scenes_are_scenes(path):
     assert scene.law.kn == 2e5
     quartz = {"quartz": 74.7, "quartz_1MPa": 7.47, "quartz_10MPa": 74.7, "quartz_100MPa": 747}
     assert scene.load.fy == quartz.get(path.stem, 3.0)
-
-
-def test_the_paper_scene_holds_the_papers_numbers():
-    scene = Scene.from_toml(ROOT / "scenes" / "paper.toml")
-    assert (scene.law.mus, scene.law.kt) == ((1.0, 0.8), 2 * 2e5 / 7)
-    assert (scene.friction.B, scene.friction.w, scene.friction.mu_ss) == (0.2, 0.4, 0.8)
+    if path.stem == "paper":
+        assert (scene.law.mus, scene.law.kt) == ((1.0, 0.8), 2 * 2e5 / 7)
+        assert (scene.friction.B, scene.friction.w, scene.friction.mu_ss) == (0.2, 0.4, 0.8)
 
 
 def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "packing.json").write_bytes(REFERENCE.read_bytes())
-    toml = tmp_path / "scene.toml"
-    toml.write_text('[packing]\nfile = "data/packing.json"\n[law]\nkn = 2e5\n[load]\nfy = 3\n')
-    scene = Scene.from_toml(toml)
+    (tmp_path / "scene.toml").write_text(toml(LEAST | {"packing": {"file": "data/packing.json"}}))
+    scene = Scene.from_toml(tmp_path / "scene.toml")
     assert scene.packing.file == (tmp_path / "data" / "packing.json").resolve()
     assert Scene.from_mapping(scene.resolved()) == scene
 
@@ -154,23 +150,6 @@ def test_a_refused_file_is_named(tmp_path, content, says):
     assert str(refusal.value).startswith(str(path))
 
 
-SHORT = {
-    "packing": {"disks": 30, "top": 6, "width": 6.5, "seed": 3},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 1e-3, "until": 0.01},
-    "perturb": {"fx": 2e-3, "time": 1.0},
-}
-
-
-@pytest.mark.parametrize(
-    ("key", "value"), [("time", 2.0**63), ("time_step", 1e-30), ("inertia_factor", 1e-50), ("time", 1e13)]
-)
-def test_runs_without_end_are_refused(refused_scene, key, value):
-    says = refused_scene(SHORT | {"perturb": SHORT["perturb"] | {key: value}})
-    assert re.search(r"perturb.time = .* takes .* time steps, a year and more: lower it", says)
-
-
 WRONG = {
     "relax": {"damping": -1.0},
     "ramp": {"step": 1.0, "until": 0.5},
@@ -208,9 +187,3 @@ def test_what_a_command_does_not_read_is_checked_for_its_keys_alone(command):
 def test_a_key_that_a_command_reads_of_a_section_that_it_does_not_read_is_checked():
     with pytest.raises(SceneError, match=r"perturb\.inertia_factor = -1"):
         Scene.from_mapping(merge_changes({"perturb": {"inertia_factor": -1.0}}), command="settle")
-
-
-def test_a_target_beyond_the_disks_of_a_file_is_refused_with_the_scene(tmp_path):
-    section = {"fx": 0.0, "time": 1.0, "target": [100]}
-    with pytest.raises(SceneError, match="names disk 100: name disks from 0 to 99"):
-        Scene.from_mapping(merge_changes({"packing": {"file": str(REFERENCE)}, "perturb": section}), command="perturb")

@@ -15,13 +15,13 @@ from faultgouge.pywrap.scenes.packing_section import SettlingLoad
 from faultgouge.pywrap.scenes.scene import SECTIONS
 from faultgouge.pywrap.scenes.units import dashpot, real_units, restitution
 
-QUARTZ = {
-    "grain_diameter": "0.1 mm",
-    "density": "2.65 g/cm^3",
-    "youngs_modulus": "95 GPa",
-    "poisson_ratio": 0.08,
-}
+QUARTZ = {"grain_diameter": "0.1 mm", "density": "2.65 g/cm^3", "youngs_modulus": "95 GPa", "poisson_ratio": 0.08}
 LEAST = {"packing": {"disks": 100, "width": 11.9, "top": 10}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+SIZED = {"packing": {"radii": ["50 um", "70 um"], "width": "1.19 mm", "top": 10}, "units": QUARTZ}
+
+
+def sized(**sections):
+    return Scene.from_mapping({**SIZED, **sections})
 
 
 def scene(**units):
@@ -30,20 +30,18 @@ def scene(**units):
 
 def test_units_are_those_of_hertz_and_of_the_grains():
     real = real_units(scene())
-    assert real.length == pytest.approx(1e-4, rel=1e-12)
-    assert real.mass == pytest.approx(2650 * np.pi / 6 * 1e-12, rel=1e-12)
+    assert (real.length, real.mass) == pytest.approx((1e-4, 2650 * np.pi / 6 * 1e-12), rel=1e-12)
     # two spheres of radius R press with (4/3) E* sqrt(R/2) delta^(3/2), E* = E/2(1 - nu^2)
     stiffness = 4 / 3 * 95e9 / 2 / (1 - 0.08**2) * np.sqrt(0.5e-4 / 2)
-    in_units_of_the_scene = stiffness * real.length**1.5 / real.force
-    assert in_units_of_the_scene == pytest.approx(2e5, rel=1e-12)
+    assert stiffness * real.length**1.5 / real.force == pytest.approx(2e5, rel=1e-12)
     assert real.overburden == pytest.approx(10 * 3.0 * real.force / (11.9 * 1e-4 * 1e-4), rel=1e-12)
     assert real.frequency(2 * np.pi) == pytest.approx(1 / real.time, rel=1e-12)
     # sigma = rho c v of a plane shear wave
-    shear = 95e9 / 2 / 1.08
-    assert real.ground_velocity(0.01, 5.0, "layer") == pytest.approx(
-        real.stress(0.01) / np.sqrt(shear * 2650), rel=1e-12
-    )
+    velocity = real.stress(0.01) / np.sqrt(95e9 / 2 / 1.08 * 2650)
+    assert real.ground_velocity(0.01, 5.0, "layer") == pytest.approx(velocity, rel=1e-12)
     assert real.ground_velocity(0.01, 5.0, "floor") == pytest.approx(0.01 / 5.0 * real.velocity(1.0), rel=1e-12)
+    heavy = real_units(Scene.from_mapping(LEAST | {"packing": LEAST["packing"] | {"mass": 4.0}, "units": QUARTZ}))
+    assert (heavy.mass, heavy.time) == pytest.approx((real.mass / 4, real.time / 2), rel=1e-12)
 
 
 def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_path):
@@ -77,13 +75,6 @@ def test_dashpot_of_a_restitution_gives_it(wanted):
     assert restitution(2e5, dashpot(2e5, wanted, 2.0, 0.03), 2.0, 0.03) == pytest.approx(wanted, rel=1e-8)
 
 
-SIZED = {"packing": {"radii": ["50 um", "70 um"], "width": "1.19 mm", "top": 10}, "units": QUARTZ}
-
-
-def sized(**sections):
-    return Scene.from_mapping({**SIZED, **sections})
-
-
 def test_stiffness_and_load_follow_from_the_grains_and_the_overburden():
     found = sized(units={**QUARTZ, "overburden": "10 MPa"})
     assert (found.packing.radii, found.packing.width, found.law.kn) == ((0.5, 0.7), 11.9, 2e5)
@@ -113,37 +104,31 @@ def test_any_number_of_a_scene_may_have_its_unit():
         "relax": {"damping": "1 kg/s"},
     }
     found = sized(**sections)
-    real = real_units(found)
-    assert real.stress(found.packing.settle_at.fy) == pytest.approx(1e6)
-    assert [real.stress(each) for each in found.ramp.until] == pytest.approx([1e6, 0.0])
-    assert real.stress(found.ramp.step) == pytest.approx(1e3)
-    assert [real.stress(each) for each in found.eruptions.load] == pytest.approx([1e6, 2e6])
+    real, perturb = real_units(found), found.perturb
+    stresses = (found.packing.settle_at.fy, *found.ramp.until, found.ramp.step, *found.eruptions.load)
+    assert [real.stress(each) for each in stresses] == pytest.approx([1e6, 1e6, 0.0, 1e3, 1e6, 2e6])
     assert found.law.kt / found.law.kn == pytest.approx(1e8 / 3.187e8, rel=1e-3)  # as is kn, given to four digits
-    assert found.perturb.amplitude * real.force == pytest.approx(1e-9)
-    assert real.frequency(found.perturb.omega) == pytest.approx(1e3)
-    assert found.perturb.time * real.time == pytest.approx(1e-3)
+    moved = (perturb.amplitude * real.force, real.frequency(perturb.omega), perturb.time * real.time)
+    assert moved == pytest.approx((1e-9, 1e3, 1e-3))
     assert np.array(found.trigger.omega) / real.time == pytest.approx([2e6 * np.pi, 1e6])
-    assert real.velocity(found.friction.v0) == pytest.approx(1e-3)
-    assert found.damping.tau * real.time == pytest.approx(1.0)
-    assert found.damping.cn * real.force * real.time / real.length**1.5 == pytest.approx(1.0)
+    damped = (found.damping.tau * real.time, found.damping.cn * real.force * real.time / real.length**1.5)
+    assert (real.velocity(found.friction.v0), *damped) == pytest.approx((1e-3, 1.0, 1.0))
     assert found.relax.damping * real.mass / real.time == pytest.approx(1.0)
-    on_floor = {"fx": 0.0, "time": 1.0, "signal": "pulse", "on": "floor", "omega": 1.0, "amplitude": "2 mm/s"}
-    moved = sized(load={"fy": 3.0}, perturb=on_floor)
-    assert real_units(moved).velocity(moved.perturb.amplitude) == pytest.approx(2e-3)
 
 
-def test_a_drive_may_have_units():
+def test_a_drive_and_a_moving_floor_may_have_units():
     protocol = [["1 mm/s", "1 ms"], [0.0, "2 ms"]]
     drive = {"spring": "10 N/m", "protocol": protocol, "signal": "pulse", "at": "1 us", "omega": "1 MHz"}
-    found = sized(load={"fy": 3.0}, drive={**drive, "scale": "2 mm/s", "on": "floor", "states": "1 us"})
+    on_floor = {"fx": 0.0, "time": 1.0, "signal": "pulse", "on": "floor", "omega": 1.0, "amplitude": "2 mm/s"}
+    scale = {"scale": "2 mm/s", "on": "floor", "states": "1 us"}
+    found = sized(load={"fy": 3.0}, drive={**drive, **scale}, perturb=on_floor)
     real, (first, second) = real_units(found), found.drive.protocol
     assert found.drive.spring * real.force / real.length == pytest.approx(10)
-    assert [real.velocity(first[0]), first[1] * real.time] == pytest.approx([1e-3, 1e-3])
-    assert [second[0], second[1] * real.time] == pytest.approx([0.0, 2e-3])
-    assert real.velocity(found.drive.scale) == pytest.approx(2e-3)
-    assert (
-        sized(load={"fy": 3.0}, drive={"spring": "rigid", "velocity": "1 mm/s", "until": "1 s"}).drive.spring == "rigid"
-    )
+    times = [real.velocity(first[0]), first[1] * real.time, second[0], second[1] * real.time]
+    assert times == pytest.approx([1e-3, 1e-3, 0.0, 2e-3])
+    assert [real.velocity(each) for each in (found.drive.scale, found.perturb.amplitude)] == pytest.approx([2e-3] * 2)
+    rigid = {"spring": "rigid", "velocity": "1 mm/s", "until": "1 s"}
+    assert sized(load={"fy": 3.0}, drive=rigid).drive.spring == "rigid"
 
 
 def test_every_number_of_a_scene_has_its_dimension_or_none():
@@ -157,15 +142,6 @@ def test_every_number_of_a_scene_has_its_dimension_or_none():
             text = str(field.annotation)
             if ("float" in text or "int" in text) and not {key, f"{name}.{key}"} & plain:
                 assert "BeforeValidator" in f"{field.metadata}{text}", f"{name}.{key}"
-
-
-def test_the_mass_of_a_grain_is_that_of_the_scene():
-    light, heavy = (real_units(Scene.from_mapping({**LEAST, "packing": p, "units": QUARTZ})) for p in MASSES)
-    assert heavy.mass == pytest.approx(light.mass / 4, rel=1e-12)
-    assert heavy.time == pytest.approx(light.time / 2, rel=1e-12)
-
-
-MASSES = [LEAST["packing"] | {"mass": mass} for mass in (1.0, 4.0)]
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,14 @@
 
 import json
 from importlib import import_module
-from pathlib import Path
 
-import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.studies.sweep import sweep_plan
 from faultgouge.studies.sweep.run_sweep import merge, run_sweep
-from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings
+from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.user_function import user_function
 
 TASK = """
@@ -66,12 +64,8 @@ def sweep_of(folder, function, seeds="1:3"):
     return Sweep.from_mapping(mapping, folder)
 
 
-def shards(place, folder, function):
-    """The folders of the two shards of a sweep."""
-    parts = [place / f"part{k}" for k in (1, 2)]
-    for k, part in enumerate(parts, 1):
-        run_sweep(sweep_of(folder, function), part, (k, 2), say=id)
-    return parts
+def run(folder, function, place="out", seeds="1:3", part=(1, 1), say=id):
+    return run_sweep(sweep_of(folder, function, seeds), folder / place, part, say=say)
 
 
 @pytest.mark.parametrize(
@@ -105,22 +99,14 @@ def test_a_row_is_known_by_all_that_its_number_depends_on(folder, monkeypatch, n
 
 
 def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package(tmp_path, monkeypatch):
-    package = tmp_path / "grains_of_mine"
+    package, found = tmp_path / "grains_of_mine", []
     package.mkdir()
     monkeypatch.syspath_prepend(tmp_path)
-    texts = {
-        "__init__": "",
-        "tasks": "import beside\nfrom . import numbers\ndef task(scene): ...",
-        "numbers": "one = 1",
-    }
-    for name, text in texts.items():
-        (package / f"{name}.py").write_text(text)
-    found = []
-    for path, text in (
-        (tmp_path / "beside.py", "two = 2"),
-        (tmp_path / "beside.py", "2"),
-        (package / "numbers.py", ""),
-    ):
+    (package / "__init__.py").touch()
+    (package / "tasks.py").write_text("import beside\nfrom . import numbers\ndef task(scene): ...")
+    (package / "numbers.py").write_text("one = 1")
+    beside = tmp_path / "beside.py"
+    for path, text in ((beside, "two = 2"), (beside, "2"), (package / "numbers.py", "")):
         path.write_text(text)
         user_function.cache_clear()
         found.append(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}).points[0].key)
@@ -128,26 +114,23 @@ def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package
 
 
 def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
-    sweep = sweep_of(folder, "passing")
-    rows = run_sweep(sweep, folder / "out", say=id)
+    rows = run(folder, "passing")
     assert rows[0]["says"] == "it flows"
     assert rows[1]["says"] == "scene 1: passing failed with OSError: the disk is full (ask.py, line 17)"
-    again = run_sweep(sweep, folder / "out", say=id)
+    again = run(folder, "passing")
     assert (folder / "calls").read_text().split() == ["1", "2", "3", "2"]
     assert [row["result"].get("seed") for row in again] == [None, 2, 3]
-    run_sweep(sweep, folder / "out", say=id)
+    run(folder, "passing")
     assert len((folder / "calls").read_text().split()) == 4
 
 
 def test_rows_of_a_function_hold_its_numbers_or_say_why_not(folder):
-    first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id)
+    (first,) = run(folder, "contacts", "contacts", "1:1")
     rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
     assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
-    for function, says in (
-        ("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"),
-        ("seed_of", "returned 1: "),
-    ):
-        first, second = run_sweep(sweep_of(folder, function, "1:2"), folder / function, say=id)
+    exits = "scene 0: ends failed with SystemExit:  (ask.py, line 22)"
+    for function, says in (("ends", exits), ("seed_of", "returned 1: ")):
+        first, second = run(folder, function, function, "1:2")
         assert says in first["says"]
         assert (second["says"] is None) is (function == "ends")
 
@@ -156,10 +139,11 @@ def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(fol
     """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused.
     What is no number is the same result again. The keys are those that the sweep had."""
     for function in ("ends", "nothing"):
-        one, two = shards(folder / function, folder, function)
+        one, two, whole = (folder / function / name for name in ("part1", "part2", "whole"))
+        for k, part in enumerate((one, two), 1):
+            run(folder, function, part, part=(k, 2))
         half = (one / "results.jsonl").read_text() + '{"key": "0123'
         (one / "results.jsonl").write_text(half)
-        whole = folder / function / "whole"
         assert len(merge([one, two], whole, id)[1]) == 3
         before = (whole / "results.jsonl").read_text()
         merge([one], whole, id)
@@ -168,13 +152,13 @@ def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(fol
         assert (one / "results.jsonl").read_text() == half
         assert len((whole / "results.csv").read_text().splitlines()) == 4
     other = folder / "other"
-    run_sweep(sweep_of(folder, "ends", "7:9"), other, say=id)
+    run(folder, "ends", other, "7:9")
     files = {path: path.read_bytes() for path in other.iterdir()}
     with pytest.raises(SceneError, match=r"other is of another sweep than .*part1.* \(task differs\)"):
         merge([one, two], other, id)
     assert {path: path.read_bytes() for path in other.iterdir()} == files
     monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
-    run_sweep(sweep_of(folder, "nothing"), two, (2, 2), say=id)
+    run(folder, "nothing", two, part=(2, 2))
     with pytest.raises(SceneError, match=r"part2 is of another sweep than .*part1.* \(version differs\)"):
         merge([one, two], folder / "new", id)
     for text in ('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}', "no JSON", "3"):
@@ -186,7 +170,7 @@ def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(fol
 
 def test_a_good_row_goes_before_an_error_and_two_results_are_named(folder):
     for name, change in (("good", {}), ("bad", {"says": "out of memory"}), ("other", {"result": {"seed": 5}})):
-        run_sweep(sweep_of(folder, "ends", "2:3"), folder / name, say=id)
+        run(folder, "ends", name, "2:3")
         first, second = (folder / name / "results.jsonl").read_text().splitlines()
         (folder / name / "results.jsonl").write_text(f"{json.dumps(json.loads(first) | change)}\n{second}\n")
     for number, names in enumerate((("good", "bad"), ("bad", "good"))):
@@ -198,10 +182,10 @@ def test_a_good_row_goes_before_an_error_and_two_results_are_named(folder):
 
 
 def test_rows_of_other_code_stay_and_are_told(folder):
-    run_sweep(sweep_of(folder, "ends"), folder / "out", say=id)
+    run(folder, "ends")
     before, said = (folder / "out" / "results.jsonl").read_text(), []
     (folder / "ask.py").write_text(TASK.replace('{"seed": scene.packing.seed}', '{"seed": 2 * scene.packing.seed}'))
-    rows = run_sweep(sweep_of(folder, "ends"), folder / "out", say=said.append)
+    rows = run(folder, "ends", say=said.append)
     assert [row["result"].get("seed") for row in rows] == [None, 4, 6]
     assert said == ["3 rows there are of other scenes, code or versions, and are not in the table"]
     assert (folder / "out" / "results.jsonl").read_text().startswith(before)
@@ -216,27 +200,3 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
     assert len((folder / "out" / "results.csv").read_text().splitlines()) == 3
     (folder / "fails.toml").write_text(text.replace("fails", "ends"))
     faultgouge_here("sweep", "fails.toml", "-o", "some", "--workers", "1")  # one has failed, and one has not
-
-
-@pytest.mark.parametrize(
-    ("axes", "packing", "named"),
-    [
-        ({"load.fy": [3.0, 3.001], "packing.seed": "1:2"}, {}, "load.fy"),
-        ({"law.mu": [0.5, 1.0], "packing.seed": "1:3"}, {}, None),
-        ({"law.mu": [0.5, 1.0]}, {"settle_friction": True}, "law.mu"),
-        ({"load.fy": [3.0, 3.001]}, {"settle_at": {"fy": 3.0}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0, "kn": 2e5}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0}}, "law.kn"),  # settled at each stiffness
-    ],
-)
-def test_a_sweep_says_where_a_seed_is_several_packings(axes, packing, named):
-    scene = SMALL | {"packing": SMALL["packing"] | packing}
-    says = other_packings(Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": scene}))
-    assert says is None if named is None else says.startswith(f"{named}: settling is chaotic")
-
-
-def test_an_overburden_that_varies_is_a_load_that_does():
-    sweep = Sweep.from_toml(Path(__file__).parents[2] / "scenes" / "sweeps" / "depth.toml")
-    assert other_packings(sweep) is None  # settled at one load
-    loads = [point.scene.load.fy for point in sweep.points[::20]]
-    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)

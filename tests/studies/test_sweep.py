@@ -19,18 +19,18 @@ from faultgouge.pywrap import SceneError, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep
-from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.workers import Processes, WorkerError, compute_points, open_executor
+from faultgouge.studies.sweep.run_sweep import WorkerError, merge, read_results, run_sweep
+from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings
 
+SWEEPS = Path(__file__).parents[2] / "scenes" / "sweeps"
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
 TOML = 'task = "onset"\n' + toml({"sweep": {json.dumps(key): values for key, values in AXES.items()}})
 TOML += toml(SMALL, "scene.")
 
 
-def sweep_of(axes, task="onset", **changes):
+def sweep_of(axes, task="onset", folder=Path(), **changes):
     scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
-    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene})
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, folder)
 
 
 def table(folder):
@@ -51,18 +51,31 @@ def test_points_are_the_product_and_keys_those_of_scenes():
 
 
 @pytest.mark.parametrize(
-    ("axes", "packing", "shared"),
+    ("axes", "packing", "shared", "named"),
     [
-        ({"law.mu": [0.5, 1.0]}, {}, True),
-        ({"ramp.until": [0.01, 0.02]}, {}, True),
-        ({"law.mu": [0.5, 1.0]}, {"settle_friction": True}, False),
-        ({"load.fy": [2.0, 3.0]}, {}, False),
-        ({"law.kn": [1e5, 2e5]}, {}, False),
+        ({"law.mu": [0.5, 1.0]}, {}, True, None),
+        ({"ramp.until": [0.01, 0.02]}, {}, True, None),
+        ({"law.mu": [0.5, 1.0]}, {"settle_friction": True}, False, "law.mu"),
+        ({"load.fy": [3.0, 3.001]}, {}, False, "load.fy"),
+        ({"law.kn": [1e5, 2e5]}, {}, False, "law.kn"),
+        ({"load.fy": [3.0, 3.001]}, {"settle_at": {"fy": 3.0}}, False, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0, "kn": 2e5}}, False, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0}}, False, "law.kn"),  # settled at each stiffness
     ],
 )
-def test_what_settles_alike(axes, packing, shared):
-    first, second = sweep_of(axes, packing=packing).points
+def test_what_settles_alike_and_where_a_seed_is_several_packings(axes, packing, shared, named):
+    sweep = sweep_of(axes, packing=packing)
+    first, second = sweep.points
     assert (first.settling_key == second.settling_key) is shared
+    says = other_packings(sweep)
+    assert says is None if named is None else says.startswith(f"{named}: settling is chaotic")
+
+
+def test_an_overburden_that_varies_is_a_load_that_does():
+    sweep = Sweep.from_toml(SWEEPS / "depth.toml")
+    assert other_packings(sweep) is None  # settled at one load
+    loads = [point.scene.load.fy for point in sweep.points[::20]]
+    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
 
 
 @pytest.mark.parametrize(("mapping", "says"), rows_of("studies/refused_sweeps.txt"))
@@ -83,34 +96,35 @@ def test_rows_are_the_onsets_of_their_scenes_and_share_settled_packings(tmp_path
     assert len(settled) == 2
     rows = table(tmp_path)
     assert [row["ends"] for row in rows] == ["until", "until", "onset", "onset"]
-    for row, point in list(zip(rows, sweep.points, strict=True))[2:]:
-        window = onset_run(point.scene, point.scene.law.mus[0]).windows[0]
-        # the run extrapolates the path's increments away, and states what that may miss; a row does not
-        assert float(row["fx_c"]) == pytest.approx(window.fx_onset, abs=window.error + float(row["error"]))
-        assert row["kind"] == window.kind == "coalescence"
-        assert 1 <= float(row["participation"]) <= 30
-        assert row["contacts"] == str(len(settle(point.scene).packing.contacts))
+    row, scene = rows[2], sweep.points[2].scene
+    window = onset_run(scene, 0.5).windows[0]
+    # the run extrapolates the path's increments away, and states what that may miss; a row does not
+    assert float(row["fx_c"]) == pytest.approx(window.fx_onset, abs=window.error + float(row["error"]))
+    assert row["kind"] == window.kind == "coalescence"
+    assert 1 <= float(row["participation"]) <= 30
+    assert row["contacts"] == str(len(settle(scene).packing.contacts))
     # the page names each column, and no other
     page = (Path(__file__).parents[2] / "docs" / "howto_sweep.md").read_text().partition("The table of the task")[2]
     lines = [line.split(" | ")[0] for line in page.splitlines() if line.startswith("| `")]
-    named = {name for line in lines for name in re.findall(r"`(\w+)`", line)}
-    assert named == {*rows[2]} - {"packing.seed", "law.mu"}
+    assert {name for line in lines for name in re.findall(r"`(\w+)`", line)} == {*row} - {"packing.seed", "law.mu"}
+
+
+SEEDS = "def seed_of(scene): return {'seed': scene.packing.seed}\n"
 
 
 def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
-    run_sweep(sweep_of({"packing.seed": "1:1"}), tmp_path, say=id)
+    (tmp_path / "ask.py").write_text(SEEDS)
+    sweeps = [sweep_of({"packing.seed": seeds}, "ask.py:seed_of", tmp_path) for seeds in ("1:1", "1:2")]
+    run_sweep(sweeps[0], tmp_path, say=id)
     lines, said = tmp_path / "results.jsonl", []
     first = lines.read_text()
     lines.write_text(first + first[:40])
-    run_sweep(sweep_of({"packing.seed": "1:2"}), tmp_path, say=said.append, workers=2)
+    run_sweep(sweeps[1], tmp_path, say=said.append, workers=2)
     assert said == [f"1 of 2 points are in {lines} already"]
     assert lines.read_text().startswith(first)
     assert [row["values"]["packing.seed"] for row in read_results(lines).values()] == [1, 2]  # nothing of the cut line
-    for strange in (
-        "no result",
-        '{"key": "0"}',
-        first.strip().replace('"key": "', '"key": ["').replace('", "ver', '"], "ver'),
-    ):
+    of_list = first.strip().replace('"key": "', '"key": ["').replace('", "ver', '"], "ver')
+    for strange in ("no result", '{"key": "0"}', of_list):
         lines.write_text(f"{first}{strange}\n")
         with pytest.raises(SceneError, match="line 2 is no result of a sweep: take it out"):
             read_results(lines)
@@ -194,50 +208,40 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
     assert run["msd"] > 0
 
 
-@pytest.fixture(scope="module")
-def sweep():
-    return sweep_of({"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]})
+def stripped(rows):
+    """Rows without their times."""
+    return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
 
 
-def stripped(row):
-    """A row without its times, as text."""
-    return str({name: value for name, value in row.items() if "seconds" not in name})
+def killing(kill, after):
+    """A progress of rows that once kills a worker after some of them, as the system does where memory runs out."""
+    seen = []
+
+    def progress(rows, count):
+        for row in rows:
+            yield row
+            seen.append(row)
+            if len(seen) == after:
+                kill()
+
+    return progress
 
 
 @pytest.mark.long
-def test_a_killed_worker_takes_nothing_with_it(sweep):
-    rows, found = sorted(stripped(row) for row in compute_points(None, sweep.task, sweep.points)), []
-    with open_executor(2) as pool:
-        for row in compute_points(pool, sweep.task, sweep.points):
-            if not found:
-                one, _ = multiprocessing.active_children()
-                one.kill()
-            found.append(stripped(row))
-    assert sorted(found) == rows
-
-
-class Deadly(Processes):
-    """Processes of which each dies of the first point that it takes."""
-
-    def submit(self, fn, /, *args, **kwargs):
-        return super().submit(signal.raise_signal, signal.SIGKILL)
+def test_a_killed_worker_takes_nothing_with_it(tmp_path):
+    sweep, said = sweep_of({"packing.seed": "1:3", "law.mu": [1.0, 0.5, -1.0]}), []
+    alone = run_sweep(sweep, tmp_path / "alone", say=id)
+    progress = killing(lambda: multiprocessing.active_children()[0].kill(), 1)
+    found = run_sweep(sweep, tmp_path / "two", say=said.append, progress=progress, workers=2)
+    assert stripped(found) == stripped(alone)
+    assert "a worker was killed" in said[0]
 
 
 @pytest.mark.slow
-def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
-    pool = Deadly(2)
+def test_points_that_kill_every_worker_are_not_tried_for_ever(tmp_path):
+    (tmp_path / "ask.py").write_text("import os\ndef dies(scene): os.kill(os.getpid(), 9)\n")
     with pytest.raises(WorkerError, match="fewer --workers"):
-        list(compute_points(pool, sweep.task, sweep.points))
-    pool.shutdown()
-
-
-@pytest.mark.slow
-def test_workers_that_end_as_they_start_are_told(monkeypatch):
-    monkeypatch.setattr(workers, "end_with", os._exit)
-    pool = Processes(2)
-    with pytest.raises(WorkerError, match="the workers end as they start; each reads a script anew"):
-        pool.submit(os.getpid).result()
-    pool.shutdown()
+        run_sweep(sweep_of({"packing.seed": "1:2"}, "ask.py:dies", tmp_path), tmp_path, say=id, workers=2)
 
 
 TIMES = ("comm.timeouts.connect", "comm.timeouts.tcp", "deploy.lost-worker-timeout")
@@ -251,21 +255,14 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
     sweep = sweep_of({"packing.seed": "1:40"})
     alone = run_sweep(sweep, tmp_path / "alone", say=id, workers=1)
-
-    def killing(rows, count):
-        """The rows; after four of them a worker is killed, as the system does where memory runs out."""
-        for number, row in enumerate(rows, 1):
-            if number == 4:
-                os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
-            yield row
-
     # one thread a worker: LAMMPS does not stand several in a process
     with (
         dask.config.set(PATIENCE),
         distributed.LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
+        progress = killing(lambda: os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL), 4)
         executor = client.get_executor(pure=False)
-        found = run_sweep(sweep, tmp_path / "cluster", say=id, progress=killing, executor=executor)
+        found = run_sweep(sweep, tmp_path / "cluster", say=id, progress=progress, executor=executor)
     assert [row["key"] for row in found] == [point.key for point in sweep.points]
-    assert [stripped(row) for row in found] == [stripped(row) for row in alone]
+    assert stripped(found) == stripped(alone)

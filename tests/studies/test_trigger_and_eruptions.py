@@ -11,9 +11,8 @@ from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
 from faultgouge.pywrap import Scene, SceneError, perturb, reach, settle
-from faultgouge.studies.eruptions import StartOfRun as RunStart
 from faultgouge.studies.eruptions import erupt, eruptions
-from faultgouge.studies.trigger import Wave, bisect_amplitude, predictions, trigger
+from faultgouge.studies.trigger import bisect_amplitude, predictions, trigger
 from faultgouge.studies.triggering import JUMP_SHARE, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
@@ -80,7 +79,7 @@ def test_a_threshold_below_rounding_noise_gives_no_amplitude():
     packing = settle(scene).packing
     (expected,) = predictions(scene, packing, 0.1, np.array([14.0]))
     with pytest.raises(SceneError, match="exceeds v_0 = 1e-16 without a wave"):
-        bisect_amplitude(Wave(scene, packing, expected))
+        bisect_amplitude((scene, packing, expected))
 
 
 @pytest.mark.long
@@ -95,7 +94,7 @@ def test_a_stable_packing_is_watched_for_a_time_of_its_own_units(units, friction
     start, unit = settle(Scene.from_mapping(scene)), (mass * length / force) ** 0.5
     if friction:
         monkeypatch.setattr(import_module("faultgouge.studies.eruptions"), "growth_rate", lambda packing: 0.0)
-    run = erupt(RunStart(start.packing, start.residual, 200.0 * unit))
+    run = erupt((start.packing, start.residual, 200.0 * unit))
     assert run["ends"] == ("rises" if friction else "stable")
     assert 50 <= run["time"] / unit < 52  # looked at 400 times in 200
 

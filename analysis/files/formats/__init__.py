@@ -101,26 +101,24 @@ def format_of(path: Path) -> Format:
     OSError
         If the file cannot be read.
     """
-    words: list[str] = []
+    words, name = list[str](), path.name.lower().removesuffix(".gz")
     with suppress(OSError, UnicodeDecodeError, EOFError, zlib.error), open_text(path) as stream:
         words = stream.readline(400).split()
     if words[:1] == ["#format"]:
         return YADE
-    if len(words) in (6, 8) and ".data" in path.name.lower() and all(map(WORD_OF_NUMBER.fullmatch, words)):
+    if len(words) in (6, 8) and ".data" in name and all(map(WORD_OF_NUMBER.fullmatch, words)):
         return MERCURY
-    suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
-    if suffix.lower() in READERS:
-        return READERS[suffix.lower()]
-    if begins_with(path, RESTART_BEGINNING):
-        return RESTART
-    begin = path.name.split(".")[0].lower()
-    if begin in ("data", "dump"):
-        return DATA if begin == "data" else DUMP
-    if is_hdf5(path):
+    found = READERS.get(Path(name).suffix)
+    if found is None and begins_with(path, RESTART_BEGINNING):
+        found = RESTART
+    found = found or {"data": DATA, "dump": DUMP}.get(name.split(".")[0])
+    if found is None and is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
-    others = "each text also as .gz, run.h5, and LAMMPS decks (.in, in.NAME)"
-    raise PackingFileError(f"{path} is of no format that is read: give {names}, {others}.")
+    if found is None:
+        names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
+        others = "each text also as .gz, run.h5, and LAMMPS decks (.in, in.NAME)"
+        raise PackingFileError(f"{path} is of no format that is read: give {names}, {others}.")
+    return found
 
 
 def read_particles(path: Path, frame: int | None = None) -> Disks:

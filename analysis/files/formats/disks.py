@@ -9,7 +9,6 @@ region, in one line of text.
 
 from __future__ import annotations
 
-import operator
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,7 +38,7 @@ LAYER_WAYS = (
 LEAST_TOUCHING_SHARE = 0.5
 """Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
 
-OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
+OPERATORS = {"<": np.less, ">": np.greater, "<=": np.less_equal, ">=": np.greater_equal}
 REGION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
 
 ALIASES = {
@@ -155,9 +154,10 @@ class Disks:
 
 def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
     """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
-    wanted, (low, high) = -1 if frame is None else frame, (min(counts, default=0), max(counts, default=0))
-    if frame is None and low != high:
-        raise PackingFileError(f"{path} has frames with {low} and {high} particles: choose one with --frame.")
+    wanted, different = -1 if frame is None else frame, sorted(set(counts))
+    if frame is None and len(different) > 1:
+        says = f"frames with {different[0]} and {different[-1]} particles"
+        raise PackingFileError(f"{path} has {says}: choose one with --frame.")
     if not -len(counts) <= wanted < len(counts):
         raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
     return wanted % len(counts)
@@ -188,10 +188,9 @@ def particles_of(
     c = standard_names(columns)
     if "diameter" in c:
         c.setdefault("radius", 0.5 * c["diameter"])
-    for name in ("x", "y", "radius"):
-        if name not in c:
-            has, also = ", ".join(columns) or "none", " or diameter" if name == "radius" else ""
-            raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
+    for name in (each for each in ("x", "y", "radius") if each not in c):
+        has, also = ", ".join(columns) or "none", " or diameter" if name == "radius" else ""
+        raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
     if not len(c["x"]):
         raise PackingFileError(f"{source} has no particles.")
     ids = c.setdefault("id", np.arange(len(c["x"]), dtype=np.float64) + np.float64(first_id))
@@ -201,18 +200,17 @@ def particles_of(
             odd, says = odd | (column <= 0), "and must be above 0"
         elif name in ("id", "type"):
             odd, says = odd | (column != np.rint(column)), "and must be a whole number"
-        if odd.any():
-            raise PackingFileError(f"{source}: {name} of particle {ids[odd][0]:g} is {column[odd][0]:g}, {says}.")
+        for k in np.flatnonzero(odd):
+            raise PackingFileError(f"{source}: {name} of particle {ids[k]:g} is {column[k]:g}, {says}.")
     order = np.argsort(ids, kind="stable")
-    for twice in ids[order][1:][np.diff(ids[order]) == 0]:
+    c = {name: column[order] for name, column in c.items()}
+    for twice in c["id"][1:][np.diff(c["id"]) == 0]:
         raise PackingFileError(f"{source} has particle {twice:g} twice: give each an ID of its own.")
-    if ids[order][0] < first_id:
-        raise PackingFileError(f"{source}: IDs must be {first_id} or more, and one is {ids[order][0]:g}.")
+    if c["id"][0] < first_id:
+        raise PackingFileError(f"{source}: IDs must be {first_id} or more, and one is {c['id'][0]:g}.")
     if "density" in c:
         c.setdefault("mass", mass_of_density(c["density"], c["radius"]))
-    c = {name: column[order] for name, column in c.items()}
-    names = np.array(type_names)[order] if len(type_names) else np.array([])
-    sides = more.get("periodic")
+    names, sides = np.array(type_names, dtype=object)[order[: len(type_names)]], more.get("periodic")
     closes = box is not None and box[0, 0] > 0 and (sides is None or sides[0])
     return Disks(
         str(source), np.column_stack([c[axis] for axis in ("xyz" if "z" in c and np.ptp(c["z"]) else "xy")]),
@@ -221,7 +219,7 @@ def particles_of(
         top=c["top"] != 0 if "top" in c else None,
         position_low=np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
         box_length=float(box[0, 0]) if box is not None and closes else None,
-        types={str(name): names == name for name in dict.fromkeys(names.tolist())}, box=box, first_id=first_id, **more,
+        types={name: names == name for name in dict.fromkeys(names.tolist())}, box=box, first_id=first_id, **more,
     )  # fmt: skip
 
 
@@ -229,9 +227,9 @@ def in_plane(found: Disks) -> Disks:
     """Particles as disks, with IDs from 1; a PackingFileError if they do not lie in a plane."""
     place, box = found.position, found.box
     if place.shape[1] == 3 and np.ptp(place[:, 2]) > FLATNESS * found.radius.min():
-        low, high = place[:, 2].min(), place[:, 2].max()
-        says = f"it is of three dimensions (z goes from {low:g} to {high:g}), and is read as disks in a plane"
-        raise PackingFileError(f"{found.source}: {says}; for spheres give --material, or `faultgouge import DECK.in`.")
+        says = f"it is of three dimensions (z goes from {place[:, 2].min():g} to {place[:, 2].max():g}), and is read as"
+        cure = "for spheres give --material, or `faultgouge import DECK.in`"
+        raise PackingFileError(f"{found.source}: {says} disks in a plane; {cure}.")
     if box is not None and np.count_nonzero(box - np.diag(np.diag(box))):
         raise PackingFileError(f"{found.source} has a tilted box: give one with right angles.")
     return replace(found, position=place[:, :2].copy(), id=found.id + (1 - found.first_id))  # 0 is the floor
@@ -289,10 +287,9 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
         if disks.slips is not None and law.frictional:
             contacts = _slipped(contacts, disks, disks.slips)
         known = disks.slips_known or not law.frictional or len(contacts) == 0
-        fields: dict[str, Any] = {
-            name: getattr(disks, name) for name in ("position", "radius", "angle", "mass", "position_low")
-        }
-        return Packing(contacts=contacts, law=law, top=top, slips_known=known, box_length=period, **(fields | load))
+        given: dict[str, Any] = {name: getattr(disks, name) for name in ("radius", "angle", "mass", "position_low")}
+        given |= {"slips_known": known, "box_length": period}
+        return Packing(position=place, contacts=contacts, law=law, top=top, **(given | load))
 
 
 def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
@@ -302,21 +299,18 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
         raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
     ends[ids == 0] = FLOOR
-    i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
-    listed = Contacts(i, j, slips.slip, slips.low)
+    listed = Contacts(*np.where(ends[0] == FLOOR, ends[::-1], ends), slips.slip, slips.low)
     if slips.complete:
         return listed
-    known = {pair: k for k, pair in enumerate(zip(near.i.tolist(), near.j.tolist(), strict=True))}
-    slip, lost = np.zeros(len(near)), []
-    for first, second, size in zip(listed.i.tolist(), listed.j.tolist(), listed.slip.tolist(), strict=True):
-        if (first, second) in known:
-            slip[known[first, second]] = size
-        elif size:
-            lost.append(f"{disks.id[first]} and {disks.id[second] if second >= 0 else 'the floor'}")
+    slip = dict(zip(zip(listed.i.tolist(), listed.j.tolist(), strict=True), listed.slip.tolist(), strict=True))
+    known = [slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]
+    lost = [(disks.id[i], disks.id[j] if j >= 0 else "the floor") for (i, j), size in slip.items() if size]
     if lost:
-        says = f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0]}"
+        says = (
+            f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0][0]} and {lost[0][1]}"
+        )
         raise PackingFileError(f"{disks.source}: {says}: leave such rows out, or give places and radii that touch.")
-    return near.slipped(slip)
+    return near.slipped(np.array(known))
 
 
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
@@ -341,10 +335,10 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
     BadInputError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
-    text = "" if says is None else str(says).strip()
     if says is None and disks.top is None:
         unsaid = f"{disks.source} does not say which disks are the upper layer"
         raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+    text = "" if says is None else str(says).strip()
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
     except (OSError, ValueError) as error:
@@ -358,16 +352,16 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
     """The layer that a text names; a ValueError or an OSError says why it is none."""
     kind, _, value = text.partition(":")
+    (x, y), radius = disks.position.T, disks.radius
     if text.isdecimal():
         if int(text) > len(disks):
             raise ValueError(f"{disks.source} has {len(disks)} disks alone")
-        order = np.argsort(-disks.position[:, 1], kind="stable")
         with telling(disks.source, "describes no possible packing", ValueError):
-            contacts = touching(disks.position, disks.radius, disks.box_length)
+            contacts = touching(disks.position, radius, disks.box_length)
+        order = np.argsort(-y, kind="stable")
         held = np.isin(order, [contacts.i, contacts.j])
-        if held.sum() >= max(int(text), LEAST_TOUCHING_SHARE * len(disks)):
-            order = order[held]
-        return np.isin(np.arange(len(disks)), order[: int(text)])
+        enough = held.sum() >= max(int(text), LEAST_TOUCHING_SHARE * len(disks))
+        return np.isin(np.arange(len(disks)), (order[held] if enough else order)[: int(text)])
     if kind in ("type", "group") and value:
         known = dict(disks.types if kind == "type" else disks.groups)
         if kind == "type" and disks.kind is not None:
@@ -376,17 +370,18 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
             raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(known) or 'none'})")
         return known[value]
     if kind == "ids" and value:
-        wanted = set[int]()
+        chosen = np.zeros(len(disks), dtype=np.bool_)
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
-            match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
-            if not match:
+            if not re.fullmatch(r"\d+(-\d+)?", part):
                 raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            wanted.update(range(int(match[1]), int(match[2] or match[1]) + 1))
-        for missing in sorted(wanted - set(disks.id.tolist())):
-            raise ValueError(f"{disks.source} has no disk {missing}")
-        return np.isin(disks.id, list(wanted))
-    values = {"x": disks.position[:, 0], "y": disks.position[:, 1], "radius": disks.radius}
+            first, last = (int(each) for each in (part.split("-") * 2)[:2])
+            within = (first <= disks.id) & (disks.id <= last)
+            if within.sum() <= last - first:
+                raise ValueError(f"{disks.source} has no disk {part}")
+            chosen |= within
+        return chosen
     parts = [REGION.fullmatch(part) for part in text.split(" and ")]
     if None in parts:
         raise ValueError(f"it is none of {LAYER_WAYS}")
+    values = {"x": x, "y": y, "radius": radius}
     return np.all([OPERATORS[each[2]](values[each[1]], float(each[3])) for each in parts if each], axis=0)

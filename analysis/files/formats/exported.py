@@ -22,16 +22,14 @@ from ...contacts import LinearisedContacts
 from ...errors import BadInputError
 from ...packing.contacts import Contacts
 from ...packing.geometry import nearest_image, touching
+from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ...responses.hysteresis import turning_points
 from ..atomic_write import FORMAT_KEY, check_format
 from ..runfile import RunFile, law_parameters
 from .disks import Slips
 
-PARAMETER_NAMES = {
-    "kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor",
-    "slips_known",
-}  # fmt: skip
+PARAMETER_NAMES = {*MindlinLaw.__dataclass_fields__, "tau", "fx", "fy", "inertia_factor", "slips_known"}
 """Names of law, load and inertia in files; and slips_known, 0 where the slips are not known."""
 
 
@@ -109,12 +107,11 @@ def exported(
     """
     if isinstance(source, Configuration):
         return _of_configuration(source, modes)
-    p, c, g, n = source, source.contacts, source.geometry, len(source)
+    p, c, g, n, rows = source, source.contacts, source.geometry, len(source), None
     particles: dict[str, NDArray] = {"id": np.arange(1, n + 1), "radius": p.radius, "mass": p.mass}
     particles |= {"top": p.top.astype(np.int64), "normal_force": _at_particles(np.add, n, c, p.normal_force)}
     contacts: dict[str, NDArray] = {"contact_i": c.i, "contact_j": c.j}
     contacts |= {"contact_normal_force": p.normal_force, "contact_overlap": g.overlap}
-    rows = None
     if time is None:
         force = p.net_force.reshape(3, -1).T
         particles |= {"angle": p.angle, "net_force": _in_space(force[:, :2]), "torque_over_radius": force[:, 2]}
@@ -122,13 +119,12 @@ def exported(
         both = p.normal_force[:, None] * g.normal + p.tangential_force[:, None] * g.tangent
         contacts |= {"contact_force": _in_space(both), "contact_tangential_force": p.tangential_force}
         contacts |= {"contact_slip": c.slip, "contact_mobilised": p.mobilised}
-        low = [] if c.slip_low is None else [c.slip_low]
-        rows = np.column_stack([c.i + 1, c.j + 1, c.slip, *low]).astype(np.float64)
+        rows = np.column_stack([c.i + 1.0, c.j + 1.0, c.slip, *([] if c.slip_low is None else [c.slip_low])])
     if displacement is not None:
         particles["displacement"] = _in_space(displacement)
     if p.position_low is not None:
         particles |= {"x_low": p.position_low[:, 0], "y_low": p.position_low[:, 1]}
-    particles |= _of_modes(modes, lambda vectors: (_in_space(vectors[:2].T), vectors[2]))
+    vectors, eigenvalues = _of_modes(modes, lambda moved: (_in_space(moved[:2].T), moved[2]))
     more = {"tau": p.drag_time, "slips_known": None if p.slips_known else 0.0, "fx": p.fx, "fy": p.fy}
     more |= {"inertia_factor": p.inertia_factor, "box_length": p.box_length, "time": time}
     numbers = law_parameters(p.law) | {name: value for name, value in more.items() if value is not None}
@@ -137,8 +133,8 @@ def exported(
     first = p.position[c.i]
     ends = _in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1))
     box, sides = np.diag([width, height, largest]), (p.box_length is not None, False, False)
-    numbers |= _eigenvalues(modes)
-    return Exported(p, _in_space(p.position), particles, contacts, ends, numbers, box, sides, rows=rows)
+    place, numbers = _in_space(p.position), numbers | eigenvalues
+    return Exported(p, place, particles | vectors, contacts, ends, numbers, box, sides, rows=rows)
 
 
 def _of_configuration(own: Configuration, modes: Sequence[ModeVectors]) -> Exported:
@@ -149,30 +145,28 @@ def _of_configuration(own: Configuration, modes: Sequence[ModeVectors]) -> Expor
     particles |= {"net_force": own.net_force[:, 0], "net_torque": own.net_force[:, 1]}
     particles["normal_force"] = _at_particles(np.add, n, c, c.normal_force)
     particles["coordination"] = _at_particles(np.add, n, c, np.ones(len(c)))
-    particles |= _of_modes(modes, own.vectors)
-    second = np.where(c.wall, 0, own.ids[np.maximum(c.j, 0)])
-    contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i], "contact_j": second}
+    vectors, eigenvalues = _of_modes(modes, own.vectors)
+    contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i]}
+    contacts["contact_j"] = np.where(c.wall, 0, own.ids[np.maximum(c.j, 0)])
     contacts["contact_force"] = c.normal_force[:, None] * c.normal + c.tangential_force
     contacts |= {f"contact_{name}": getattr(c, name) for name in ("normal_force", "tangential_force", "overlap")}
     contacts["contact_mobilised"] = own.mobilised[touches]
     ends = np.stack([place[c.i], place[c.i] - own.branch[touches]], axis=1)
     sides = tuple(map(bool, own.periodic))
-    return Exported(own, place, particles, contacts, ends, _eigenvalues(modes), own.box, sides, own.origin)
+    return Exported(own, place, particles | vectors, contacts, ends, eigenvalues, own.box, sides, own.origin)
 
 
-def _of_modes(modes: Sequence[ModeVectors], apart: Callable[[Floats], tuple[NDArray, NDArray]]) -> dict[str, NDArray]:
+def _of_modes(
+    modes: Sequence[ModeVectors], apart: Callable[[Floats], tuple[NDArray, NDArray]]
+) -> tuple[dict[str, NDArray], dict[str, float]]:
     """Columns of vectors and rotations, into which `apart` takes coordinates; imaginary parts where there are any."""
-    found = {}
-    for name, _, moved in modes:
+    vectors, eigenvalues = dict[str, NDArray](), dict[str, float]()
+    for name, value, moved in modes:
         for part, coordinates in {"": moved.real, "_imag": moved.imag}.items():
             if not part or coordinates.any():
-                found[f"{name}{part}"], found[f"{name}{part}_rotation"] = apart(coordinates)
-    return found
-
-
-def _eigenvalues(modes: Sequence[ModeVectors]) -> dict[str, float]:
-    parts = [("_eigenvalue", np.real), ("_eigenvalue_imag", np.imag)]
-    return {f"{mode.name}{name}": float(part(mode.eigenvalue)) for mode in modes for name, part in parts}
+                vectors[f"{name}{part}"], vectors[f"{name}{part}_rotation"] = apart(coordinates)
+        eigenvalues |= {f"{name}_eigenvalue": float(value.real), f"{name}_eigenvalue_imag": float(value.imag)}
+    return vectors, eigenvalues
 
 
 def read_back(
@@ -188,16 +182,14 @@ def read_back(
         Whether rows have low parts of slips.
     """
     check_format(values.get(FORMAT_KEY), path)
-    given = {}
+    given = dict[str, float]()
     for key in PARAMETER_NAMES & values.keys():
         with suppress(TypeError, ValueError):
             given[key] = float(values[key])
     if rows is None:
         return {"given": given}
-    columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
-    first, second = columns[:2].astype(np.int64)
-    slips = Slips(first, second, columns[2], columns[3] if low else None, complete=True)
-    return {"given": given, "slips": slips}
+    first, second, *slip = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
+    return {"given": given, "slips": Slips(first.astype(np.int64), second.astype(np.int64), *slip, complete=True)}
 
 
 def _in_space(vectors: Floats) -> Floats:
@@ -218,9 +210,7 @@ def choose_frames(run: RunFile, says: str) -> range:
 
     Raises BadInputError if the text is neither, or selects no frame.
     """
-    total = len(run)
-    if "trajectory" in run.names_of_series:
-        total = 1 + len(run.series("trajectory")["time"])
+    total = 1 + len(run.series("trajectory")["time"]) if "trajectory" in run.names_of_series else len(run)
     try:
         start, stop, *step = (int(part) if part else None for part in says.replace("all", ":").split(":"))
         found = range(total)[slice(start, stop, *step)]
@@ -244,18 +234,18 @@ def frames_of(run: RunFile, numbers: range) -> Iterator[tuple[float, Exported]]:
         From :func:`choose_frames`.
     """
     undamped = "trajectory" in run.names_of_series
-    start, way = run.packing(-1 if undamped else 0), run.fx
-    if not undamped and turning_points(way):  # programs want times that grow
-        way = np.append(0.0, np.cumsum(np.abs(np.diff(way))))
-    series = run.series("trajectory") if undamped else {}
+    start, times = run.packing(-1 if undamped else 0), run.fx
+    if undamped:
+        series = run.series("trajectory")
+        times = np.append(0.0, series.pop("time"))
+    elif turning_points(times):  # programs want times that grow
+        times = np.append(0.0, np.cumsum(np.abs(np.diff(times))))
     for number in numbers:
-        time, packing = (0.0, start) if undamped else (float(way[number]), run.packing(number))
+        packing, time = start if undamped else run.packing(number), float(times[number])
         if undamped:
-            names = ("position", "position_low") if number else ()
-            place = {name: series[name][number - 1] for name in names if name in series}
+            place = {name: column[number - 1] for name, column in series.items()} if number else {}
             near = touching(place.get("position", start.position), start.radius, start.box_length)
             packing = replace(start, **place, contacts=near, angle=np.zeros(len(start)))
-            time = float(series["time"][number - 1]) if number else 0.0
         moved = nearest_image(packing.position - start.position, packing.box_length)
         if packing.position_low is not None and start.position_low is not None:
             moved = moved + (packing.position_low - start.position_low)

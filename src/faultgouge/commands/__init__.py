@@ -5,13 +5,11 @@ A command is a function with the decorator :func:`~faultgouge.commands.terminal.
 imported inside the command that needs them. Commands raise errors and never print them: :mod:`faultgouge.cli` does.
 """
 
-import re
 from collections.abc import Callable
 from importlib import import_module
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from .. import registered
 from .studies import study_command
@@ -21,23 +19,13 @@ FAMILIES = "runs", "packings", "onset", "pictures", "files", "studies"
 """Modules with commands."""
 
 
-class CommandGroup(TyperGroup):
-    """A group whose help has the whole first sentence of each command."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        with formatter.section("Commands"):
-            helps = {name: " ".join((each.help or "").split("\n\n")[0].split()) for name, each in self.commands.items()}
-            formatter.write_dl([(name, re.split(r"(?<=\.)\s", text)[0]) for name, text in helps.items()])
-
-
 def program() -> Callable[..., object]:
     """The command ``faultgouge`` with all its commands."""
     app = typer.Typer(
-        cls=CommandGroup,
         invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
-        help=QUESTION,
+        help="Does a packing of frictional grains move, and what happens when it does?",
         epilog="Examples: faultgouge examples pour && faultgouge stability pour.in; "
         "faultgouge init -o scene.toml && faultgouge onset scene.toml",
     )
@@ -48,23 +36,12 @@ def program() -> Callable[..., object]:
     return typer.main.get_command(app)
 
 
-QUESTION = "Does a packing of frictional grains move, and what happens when it does?"
-
-
 def _options(
-    context: typer.Context,
-    version: Annotated[
-        bool, typer.Option("--version", callback=lambda asked: _version(asked), is_eager=True, help="Show versions.")
-    ] = False,
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Show versions.")] = False
 ) -> None:
-    if context.invoked_subcommand is None:
+    if version:  # of the package and of the LAMMPS that it was built for
+        from importlib import metadata
+
+        print(f"faultgouge {metadata.version('faultgouge')} (LAMMPS {metadata.version('lammps')})")
+    elif context.invoked_subcommand is None:
         print(context.get_help())
-
-
-def _version(asked: bool) -> None:
-    """Versions of the package and of the LAMMPS that it was built for."""
-    if asked:
-        from importlib.metadata import version
-
-        print(f"faultgouge {version('faultgouge')} (LAMMPS {version('lammps')})")
-        raise typer.Exit()

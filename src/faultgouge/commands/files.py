@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -28,19 +28,13 @@ from .terminal import (
     working,
 )
 
-if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
-    from faultgouge.analysis.files.formats import Disks
-
 OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON; of YADE and MercuryDPM."
 OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
 OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
-OF_BALANCE = "Of a deck: force that may be out of balance, as a share of the mean contact force; 1e-4 by default."
-OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
 OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
 
 
-@command("faultgouge examples pour && faultgouge import pour.in -o packing.h5", name="import", writes="new")
+@command("faultgouge examples pour && faultgouge import pour.in -o packing.h5", writes="new")
 def import_(
     file: Annotated[Path, Argument(metavar="FILE", help=OF_SOURCE)],
     output: Annotated[Path, Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
@@ -50,14 +44,14 @@ def import_(
     mu: Annotated[float | None, Option(help="Friction coefficient; 1 by default.")] = None,
     fy: Annotated[float | None, Option(help="Load on each disk of the layer.")] = None,
     fx: Annotated[float | None, Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
-    floor: Annotated[float | None, Option(help=OF_FLOOR)] = None,
+    floor: Annotated[float | None, Option(help="y of the floor in the file; the packing is shifted to 0.")] = None,
     width: Annotated[str | None, Option(metavar="L|open", help="Period along x; that of the file by default.")] = None,
     contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
     frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
     material: MaterialOf = None,
     columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
-    balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
+    balance: Annotated[float | None, Option(min=0.0, help="Of a deck: imbalance over mean contact force.")] = None,
 ) -> Results:
     """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
 
@@ -84,14 +78,12 @@ def import_(
     kept = file.with_name(f"{file.name}.in")
     if not given and file.suffix == ".restart" and kept.is_file():
         file = kept
-    if not is_deck(file):
-        if balance is not None:
-            raise typer.BadParameter("--balance is for a LAMMPS deck (.in): leave it out")
-        yield from _disks(file, output, relax, given)
-    elif given:
+    if is_deck(file) and given:
         raise typer.BadParameter(f"{file} is a deck: only -o, --relax and --balance go with it")
-    else:
-        yield from _deck(file, output, relax, balance)
+    if not is_deck(file) and balance is not None:
+        raise typer.BadParameter("--balance is for a LAMMPS deck (.in): leave it out")
+    keeps(f"nothing has been written to {output} yet")
+    yield from _deck(file, output, relax, balance) if is_deck(file) else _disks(file, output, relax, given)
 
 
 def _deck(file: Path, output: Path, relax: bool, balance: float | None) -> Results:
@@ -101,11 +93,10 @@ def _deck(file: Path, output: Path, relax: bool, balance: float | None) -> Resul
     from faultgouge.pywrap.granular.balance import BALANCE
     from faultgouge.pywrap.granular.run_deck import run_deck
 
-    keeps(f"nothing has been written to {output} yet")
     text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
-    allowed = BALANCE if balance is None else balance
+    balance = BALANCE if balance is None else balance
     with status(f"{file}: LAMMPS runs") as show:
-        found = run_deck(file, balance=allowed, relaxes=relax, keep=output, show=show)
+        found = run_deck(file, balance=balance, relaxes=relax, keep=output, show=show)
     keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`")
     if not is_root():
         return
@@ -134,7 +125,8 @@ def _spheres(
 
     if not is_root():
         return
-    law, says = material_of(material), list[str]()
+    law, names = material_of(material), None if columns is None else columns.split(",")
+    says: list[str] = []
     if contacts is None:
         found = of_material(read_spheres(file, frame), law)
         says = [*found.remarks]
@@ -142,15 +134,13 @@ def _spheres(
         with working("draws of the forces"):
             found, says = measured_forces(file, contacts, law, frame)
     else:
-        names = None if columns is None else columns.split(",")
         found = read_contacts(read_spheres(file, frame), contacts, law, names, frame)
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written")
     yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
     if contacts is not None and not says:
         with working("stability"):
-            verdict, within = verdict_within_digits(found)
-        says = [f"{verdict}", within]
+            says = [*map(str, verdict_within_digits(found))]
     yield "\n".join(says)
 
 
@@ -159,21 +149,31 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
     from faultgouge.analysis import BadInputError, PackingFileError, RunFile
     from faultgouge.analysis.files.formats import DATA, RESTART, format_of
     from faultgouge.analysis.files.formats.tables import read_slips
+    from faultgouge.door import packing_under
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
     from faultgouge.pywrap.lammps.restart_file import read_disks
+    from faultgouge.pywrap.scenes.scene import Scene
     from faultgouge.pywrap.settling.relax import bring_to_rest
-    from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE
+    from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE, law_of, load_of
 
+    load: dict[str, Any] = {key: given[key] for key in ("kn", "mu", "fy", "fx") if key in given}
+    if "scene" in given and (decided := [f"--{key}" for key in load if key != "fx"]):
+        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
+    width, law = given.get("width", "open"), None
+    if not re.fullmatch(r"open|[\d.]*[1-9][\d.]*(e[-+]?\d+)?", width):
+        raise typer.BadParameter(f"--width {width}: give the period along x, above 0, or open")
     try:
         disks = read_disks(file, given.get("frame")).above(given.get("floor", 0.0))
-        if (width := given.get("width")) is not None:
-            if not re.fullmatch(r"open|[\d.]*[1-9][\d.]*(e[-+]?\d+)?", width):
-                raise typer.BadParameter(f"--width {width}: give the period along x, above 0, or open")
+        if "width" in given:
             disks = replace(disks, box_length=None if width == "open" else float(width))
         if "contacts" in given:
             known = {key: value for key, value in disks.given.items() if key != "slips_known"}
             disks = replace(disks, slips=read_slips(given["contacts"], disks.length_unit), given=known)
-        packing = _packing(disks, given)
+        if "scene" in given:
+            any_of_size = {"radii": [smallest := float(disks.radius.min())], "width": 20 * smallest}
+            scene = Scene.from_toml(given["scene"], packing=any_of_size, command="settle")
+            law, load = law_of(scene), {"fx": 0.0} | load_of(scene) | load
+        packing = packing_under(disks, law, load, given.get("top"))
     except (PackingFileError, BadInputError) as error:
         if given or not file.is_file() or format_of(file) not in (DATA, RESTART):
             raise
@@ -182,7 +182,6 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
     if disks.remark:
         say(f"{file}: {disks.remark}")
-    keeps(f"nothing has been written to {output} yet")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
@@ -201,43 +200,6 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
     disks_of = f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer"
     contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
     yield f"{disks_of}, {contacts_of}; residual {packing.residual:.2g}; written to {output}"
-
-
-def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
-    """The packing under the law and the load of a scene, of the options, or of the file; what none says is named."""
-    from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.atomic_write import telling
-    from faultgouge.analysis.files.formats import packing_of, upper_layer
-    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
-    from faultgouge.analysis.files.runfile import law_of_parameters
-    from faultgouge.pywrap.scenes.scene import Scene
-    from faultgouge.pywrap.settling.settle import law_of, load_of
-
-    options: dict[str, Any] = {key: given[key] for key in ("kn", "mu", "fy", "fx") if key in given}
-    top, scene = given.get("top"), given.get("scene")
-    if scene is not None and (decided := [f"--{key}" for key in options if key != "fx"]):
-        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
-    values = options if scene else {**disks.given, **options}
-    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
-    if scene is None:
-        ways = {"kn": ("--kn 2e5", "the normal stiffness"), "fy": ("--fy 3", "the load on each disk of the layer")}
-        gaps |= dict(way for key, way in ways.items() if key not in values)
-    if gaps:
-        names, example = " ".join(each.split()[0] for each in gaps), f"faultgouge import ... {' '.join(gaps)}"
-        takes = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
-        missing = " and ".join(gaps.values())
-        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{takes}")
-    layer = upper_layer(disks, top)
-    if scene is not None:
-        smallest = float(disks.radius.min())
-        wanted = Scene.from_toml(scene, packing={"radii": [smallest], "width": 20 * smallest}, command="settle")
-        law, load = law_of(wanted, wanted.law.mus[0]), load_of(wanted)
-    else:
-        with telling(disks.source, "describes no possible packing", ValueError):
-            law = law_of_parameters({"kt": 2 * values["kn"] / 7, "mu": 1.0} | values)
-        inertia = values.get("inertia_factor", 1.0)
-        load = {"fy": values["fy"], "drag_time": values.get("tau"), "inertia_factor": inertia}
-    return packing_of(disks, law, layer, **load, fx=values.get("fx", 0.0))
 
 
 @command(f"{RAMPED} && faultgouge export run.h5 --mode pair", alone=True)

@@ -35,6 +35,7 @@ def onset(
     from faultgouge.analysis.files.atomic_write import write_json
     from faultgouge.analysis.windows import LIMITS
     from faultgouge.analysis.windows.slices import remove_results
+    from faultgouge.pywrap.scenes.units import real_units
     from faultgouge.pywrap.settling.settle import shared_bed
 
     if every and (disks := scene.packing.disks) > LIMITS.all_windows:
@@ -50,8 +51,10 @@ def onset(
         try:
             each = _search(scene, mu, not every, bed, folder)
             yield from _in_words(each)
-            for real in (si := _in_si(scene, each)).get("si", [])[:1]:
-                stress, ratio, frequency = (f"{number:.4g}" for number in real.values())
+            si = {}
+            if (real := real_units(scene)) is not None:
+                si = {"si": [real.onset(window.fx_onset, window.frequency) for window in each.windows]}
+                stress, ratio, frequency = (f"{number:.4g}" for number in si["si"][0].values())
                 yield f"mu = {mu:g}: in SI a shear stress of {stress} Pa, {ratio} of the overburden, at {frequency} Hz"
             found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | si)
         except (OnsetError, NoEquilibriumError) as error:
@@ -62,9 +65,10 @@ def onset(
                 yield f"mu = {mu:g}: without dissipation {undamped.describe()}"
             if len(scene.law.mus) > 1:
                 yield f"mu = {mu:g}: no onset: {error}"
+                failed = OnsetError(
+                    f"None of the {len(scene.law.mus)} friction coefficients has an onset on this ramp."
+                )
     first = next((each for each in found if each["fx_c"] is not None), None)
-    if first is None and len(found) > 1:
-        failed = OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
     if first is not None or any("undamped" in each for each in found):
         yield f'law of friction: {scene.law.in_words} (history = "{scene.law.history}")'
         result = (first or found[0]) | ({"each_mu": found} if len(found) > 1 else {})
@@ -102,39 +106,28 @@ def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None)
     return found
 
 
-def _in_si(scene: Scene, found: Onset) -> dict[str, list[dict[str, float]]]:
-    """Loads at which windows begin, with frequencies, as the key si of a scene that has [units]; else nothing."""
-    from faultgouge.pywrap.scenes.units import real_units
-
-    if (real := real_units(scene)) is None:
-        return {}
-    omega = [each.frequency if each.dissipative else abs(each.eigenvalue) ** 0.5 for each in found.windows]
-    return {"si": [real.onset(each.fx_onset, omega[k]) for k, each in enumerate(found.windows)]}
-
-
 def _in_words(found: Onset) -> Results:
     """The onset of a friction coefficient: F_x^c, how it begins, and all windows as a table."""
     from faultgouge.analysis.uncertain_digits import with_uncertainty
 
     mu, opening = f"mu = {found.mu:g}", found.windows[0]
+    if opening.dissipative and opening.kind == "start":
+        spite = f"unstable at F_x = {opening.fx_onset:g} in spite of the dissipation, before any shear is added"
+        yield f"{mu}: {spite}: a motion of omega = {opening.frequency:.6g} grows"
+    elif opening.dissipative:
+        yield f"{mu}: with dissipation {found.describe()} ({opening.kind}, omega = {opening.frequency:.6g})"
+    else:
+        yield f"{mu}: {found.describe()}"
     if opening.dissipative:
-        omega = f"omega = {opening.frequency:.6g}"
-        if opening.kind == "start":
-            spite = f"{mu}: unstable at F_x = {opening.fx_onset:g} in spite of the dissipation"
-            yield f"{spite}, before any shear is added: a motion of {omega} grows"
-        else:
-            yield f"{mu}: with dissipation {found.describe()} ({opening.kind}, {omega})"
-        undamped = "none on this ramp" if found.undamped is None else found.undamped.describe()
-        yield f"{mu}: without dissipation {undamped}"
-        return
-    yield f"{mu}: {found.describe()}"
-    if found.complete:
-        columns = [[with_uncertainty(each.fx_onset, each.error) for each in found.windows]]
-        columns += [["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]]
-        columns += [[f"{each.eigenvalue:.6g}" for each in found.windows], [each.kind for each in found.windows]]
-        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), zip(*columns, strict=True))
+        yield f"{mu}: without dissipation {found.undamped.describe() if found.undamped else 'none on this ramp'}"
+    elif found.complete:
+        within = [with_uncertainty(each.fx_onset, each.error) for each in found.windows]
+        to = ["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]
+        begins = [(f"{each.eigenvalue:.6g}", each.kind) for each in found.windows]
+        rows = ((*ends, *how) for *ends, how in zip(within, to, begins, strict=True))
+        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), rows)
+        if found.ends is not None:
+            yield f"{mu}: the branch of equilibria ends before F_x = {found.ends:g}, where an eigenvalue is negative"
     elif opening.kind != "start":
         how = "two eigenvalues merge" if opening.kind == "coalescence" else "contacts change"
         yield f"{mu}: {how} there, and become complex about {opening.eigenvalue:.6g} ({opening.kind})"
-    if found.ends is not None and found.complete:
-        yield f"{mu}: the branch of equilibria ends before F_x = {found.ends:g}, where an eigenvalue is negative"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
@@ -21,7 +22,6 @@ from .terminal import (
     Time,
     command,
     locked,
-    one_of,
     plain,
     refuse_scene,
     say,
@@ -59,7 +59,7 @@ MaterialOf = Annotated[str | None, Option("--material", metavar="KEY=VALUE,...",
 @command("faultgouge examples pour && faultgouge stability pour.in --follow", as_json=True)
 def stability(
     file: Annotated[Path | None, Argument(metavar="FILE|DECK", help="run.h5, NAME.disks, or a deck (.in).")] = None,
-    rise: Annotated[str | None, Option(metavar="fx", help=OF_RISE, callback=one_of("fx"))] = None,
+    rise: Annotated[Literal["fx"] | None, Option(help=OF_RISE)] = None,
     followed: Annotated[float | None, Option("--time", metavar="T", help="How long motion is followed.")] = None,
     follow: Follow = False,
     relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
@@ -89,15 +89,15 @@ def stability(
         if is_root():
             found.append(verdict_of(packing, rise, followed, follow=going_on))
 
-    if is_deck(file):
+    if relax and not is_deck(file):
+        raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
+    if not is_deck(file):
+        judge(follow, stored_packing(refuse_scene(file), frame))
+    else:
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
             packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:
             judge(False, packing)
-    elif relax:
-        raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
-    else:
-        judge(follow, stored_packing(refuse_scene(file), frame))
     for verdict in found:
         yield str(verdict)
         yield verdict.as_dict()
@@ -137,13 +137,12 @@ def spectrum(
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --follow out")
     packing = stored_packing(file, frame, time)
     configuration = packing.configuration
-    size = configuration.coordinates
     if values:
         found = plain(eigenvalues(packing))
         yield from (f"{real:.17g} {imaginary:.17g}" for real, imaginary in found)
         yield {"eigenvalues": found, "rattlers": packing.rattlers.tolist(), "fx": packing.fx}
         return
-    result = None if size > VERDICT_FIRST else spectrum_of(packing)
+    result = None if configuration.coordinates > VERDICT_FIRST else spectrum_of(packing)
     verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
     yield str(verdict)
     if result is None:
@@ -153,34 +152,21 @@ def spectrum(
     fraction = None if holds_configuration(file) else solid_fraction(packing)
     yield from _spectrum_in_words(packing, result, verdict.dissipative, fraction)
     if gains is not None:
-        yield (
-            f"a displacement from rest grows by up to {gains['displacement']:.6g} times in its square, within t = "
-            f"{gains['time']:.6g} (by up to {gains['energy']:.6g} in energy); disk {gains['disk']} is the worst to push"
-            if gains["displacement"] > 1
-            else "no displacement from rest grows"
-        )
+        size = "{displacement:.6g} times in its square, within t = {time:.6g} (by up to {energy:.6g} in energy)"
+        grows = f"a displacement from rest grows by up to {size}; disk {{disk}} is the worst to push".format(**gains)
+        yield grows if gains["displacement"] > 1 else "no displacement from rest grows"
         if not gains["linear"]:
             yield "this is the gain of K alone, in which each contact has one derivative; these contacts have two"
     if spring := configuration.spring:
         yield f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks"
     of_pair = ("eigenvalue", "condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
-    yield {
-        "stability": verdict.as_dict(),
-        "eigenvalues": plain(result.eigenvalues),
-        "pairs": [{key: plain(getattr(each, key)) for key in of_pair} for each in result.pairs],
-        "pair_count": len(result.pairs),
-        "least_q": result.least_q if result.pairs else None,
-        "negative": result.negative.tolist(),
-        "stable": verdict.stable,
-        "largest_growth_rate": result.growth_rate(),
-        "rattlers": result.rattlers.tolist(),
-        "fx": configuration.fx,
-        "spring": configuration.spring,
-        "residual": packing.residual,
-        "solid_fraction": fraction,
-        "noise_pairs": result.noise_pairs,
-        "transient_gain": gains,
-    }
+    pairs = [{key: plain(getattr(each, key)) for key in of_pair} for each in result.pairs]
+    of_result = ("eigenvalues", "negative", "rattlers", "noise_pairs")
+    document: dict[str, Any] = {"stability": verdict.as_dict(), "stable": verdict.stable}
+    document |= {key: plain(getattr(result, key)) for key in of_result} | {"largest_growth_rate": result.growth_rate()}
+    document |= {"pairs": pairs, "pair_count": len(pairs), "least_q": result.least_q if pairs else None}
+    document |= {"fx": packing.fx, "spring": spring, "residual": packing.residual, "solid_fraction": fraction}
+    yield document | {"transient_gain": gains}
 
 
 def _spectrum_in_words(
@@ -189,16 +175,12 @@ def _spectrum_in_words(
     """The packing, the range of its eigenvalues, and those with which motions grow."""
     from faultgouge.analysis import growth_rate
 
-    real = result.eigenvalues.real
-    what = f"F_x = {packing.configuration.fx:g}"
+    real, what, volume = result.eigenvalues.real, f"F_x = {packing.fx:g}", f"; volume fraction {fraction or 0.0:.4f}"
     if fraction is None:
-        noun = "sphere" if packing.configuration.dimension == 3 else "disk"
-        count = len(packing.configuration)
-        what = f"{counted(count, noun)} as LAMMPS left {'it' if count == 1 else 'them'}"
+        what, volume = packing.configuration.in_words, ""
     span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
-    left_out = f"{counted(len(result.rattlers), 'rattler')} left out"
-    volume = "" if fraction is None else f"; volume fraction {fraction:.4f}"
-    yield f"{what}: {counted(len(real), 'eigenvalue')} of K{span}, {left_out}{volume}"
+    counts = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(result.rattlers), 'rattler')} left out"
+    yield f"{what}: {counts}{volume}"
     alone = " without dissipation" if dissipative else ""
     for value in result.negative:
         yield f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t){alone}, no oscillation"
@@ -213,10 +195,9 @@ def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if it is unstable or too large."""
     from faultgouge.analysis.responses.transient import GAIN_DISKS, NoGainError, transient_gains
 
-    if (size := packing.configuration.coordinates) > (most := 3 * GAIN_DISKS):
-        say(f"no gain: it is computed of up to {most} coordinates, and this packing has {size}")
-        return None
     try:
+        if (size := packing.configuration.coordinates) > (most := 3 * GAIN_DISKS):
+            raise NoGainError(f"it is computed of up to {most} coordinates, and this packing has {size}")
         displacement, energy = transient_gains(packing)
     except NoGainError as error:
         say(f"no gain: {error}")
@@ -242,11 +223,12 @@ def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -
     yield f"{configuration!r}".removeprefix("<Configuration: ").removesuffix(">")
     yield f"largest stable time step {step:.6g}{error}; all steps up to {step.certain:.6g} are stable for certain"
     for name, value in rules.items():
-        applies = "does not apply to these contacts"
-        yield f"  {RULES[name]}: {applies if value is None else f'{value:.6g}, {value / step:.3g} of the largest'}"
-    document = {"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules}
+        share = (
+            "does not apply to these contacts" if value is None else f"{value:.6g}, {value / step:.3g} of the largest"
+        )
+        yield f"  {RULES[name]}: {share}"
     # infinite where nothing touches: JSON has no such number
-    yield {key: None if value == inf else value for key, value in document.items()}
+    yield plain({"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules})
 
 
 @command("faultgouge examples fcc && faultgouge vibrations fcc.in -o vibrations", writes="folder", alone=True)
@@ -255,7 +237,7 @@ def vibrations(
     output: NewFolder = Path("vibrations"),
     material: MaterialOf = None,
     frame: Frame = -1,
-    along: Annotated[str, Option(metavar="x|y|z", help="Where plane waves run.", callback=one_of(*"xyz"))] = "x",
+    along: Annotated[Literal["x", "y", "z"], Option(help="Where plane waves run.")] = "x",
     waves: Annotated[int, Option(min=0, help="Plane waves, from the one as long as the box.")] = 4,
 ) -> Results:
     """Compute how a packing vibrates: density of states, modes, softness, plane waves, elastic moduli.
@@ -267,9 +249,8 @@ def vibrations(
     from faultgouge.analysis import vibrations as vibrations_of
     from faultgouge.analysis.files.atomic_write import write_json, write_text
     from faultgouge.analysis.files.formats import write_packing
-    from faultgouge.figures import save
     from faultgouge.figures.series import draw_vibrations, draw_waves
-    from faultgouge.figures.style import report_failure
+    from faultgouge.studies.study import draw_all
 
     packing = _any_packing(file, frame, material)
     with working(f"{file}: vibrations"):
@@ -281,33 +262,27 @@ def vibrations(
             moduli = elastic_moduli(packing)
         except BadInputError as reason:
             say(f"{reason}")
-        names: tuple[str, ...] = ("frequency", "resolution", "density", "density_error", "rotation", "damping")
-        tables: dict[str, Any] = {"density": {name: getattr(found, name) for name in names}, "modes": found.modes}
-        document: dict[str, Any] = {name: getattr(found, name) for name in ("largest", "counted", "zero", "negative")}
-        document |= {**tables, "waves": [wave._asdict() for wave in plane], "softness": soft, "softness_error": error}
-        names = ("young", "poisson", "shear", "bulk", "anisotropy", "density", "at_bound", "box")
-        names += ("tensor", "antisymmetric", "wave_speeds")
-        document["moduli"] = moduli and {name: getattr(moduli, name) for name in names}
+        of_spectrum = ("frequency", "resolution", "density", "density_error", "rotation", "damping")
+        of_moduli: tuple[str, ...] = ("young", "poisson", "shear", "bulk", "anisotropy", "density", "at_bound", "box")
+        of_moduli += ("tensor", "antisymmetric", "wave_speeds")
+        document: dict[str, Any] = {key: getattr(found, key) for key in ("largest", "counted", "zero", "negative")}
+        document |= {"density": {key: getattr(found, key) for key in of_spectrum}, "modes": found.modes}
+        document |= {"waves": [wave._asdict() for wave in plane], "softness": soft, "softness_error": error}
+        document["moduli"] = moduli and {key: getattr(moduli, key) for key in of_moduli}
         write_json(output / "vibrations.json", plain(document))
-        if plane:
-            tables["waves"] = {name: [getattr(wave, name) for wave in plane] for name in plane[0]._fields}
-        for name, columns in tables.items():
-            rows = [",".join(map(repr, map(float, row))) for row in zip(*(columns or {}).values(), strict=True)]
-            if rows:
-                head = ",".join(columns)
-                write_text(output / f"{name}.csv", "\n".join([head, *rows, ""]), head)
+        of_waves = {key: [getattr(wave, key) for wave in plane] for key in plane[0]._fields} if plane else {}
+        for name, columns in {**document, "waves": of_waves}.items():
+            if name in ("density", "modes", "waves") and columns:
+                head, rows = ",".join(columns), zip(*columns.values(), strict=True)
+                lines = [",".join(map(repr, map(float, row))) for row in rows]
+                write_text(output / f"{name}.csv", "\n".join([head, *lines, ""]), head)
         for suffix in (".xyz", ".vtp"):
             write_packing(output / f"softness{suffix}", packing, values={"softness": soft})
-        with report_failure("density", say):
-            save(draw_vibrations(found), output / "density")
-        if plane:
-            with report_failure("waves", say):
-                save(draw_waves(plane, moduli), output / "waves")
+    pictures = {"density": partial(draw_vibrations, found)}
+    draw_all(pictures | ({"waves": partial(draw_waves, plane, moduli)} if plane else {}), output, say)
     few = "all modes" if found.modes is not None else f"window {found.resolution[0] / found.largest:.2g} of the largest"
-    yield (
-        f"{found.counted} motions with a frequency up to {found.largest / 1.01:.6g} ({few}), {found.zero} without "
-        f"stiffness, {found.negative} with a negative eigenvalue; written to {output}"
-    )
+    motions = f"{found.counted} motions with a frequency up to {found.largest / 1.01:.6g} ({few}), {found.zero} without"
+    yield f"{motions} stiffness, {found.negative} with a negative eigenvalue; written to {output}"
     if moduli is not None:
         yield repr(moduli).strip("<>")
 

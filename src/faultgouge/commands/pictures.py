@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
@@ -20,7 +20,6 @@ from .terminal import (
     Time,
     command,
     locked,
-    one_of,
     print_line,
     progress,
     refuse_scene,
@@ -40,11 +39,9 @@ if TYPE_CHECKING:
 
 
 OF_MODE = "The unstable pair, or the two modes closest to merging; or mode N, by eigenvalue from 0."
-OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
-OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
 OF_COLOUR = "Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none."
-WhichColour = Annotated[str, Option(help=OF_COLOUR, callback=one_of("mobilised", "slip", "force", "none"))]
+WhichColour = Annotated[Literal["mobilised", "slip", "force", "none"], Option(help=OF_COLOUR)]
 
 
 def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:
@@ -84,15 +81,14 @@ def draw(
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     packing = stored_packing(file, -1 if frame is None else frame, time)
-    figure = None
+    of_run = mode is frame is time is None and file.suffix != ".disks" and not holds_configuration(file)
+    figure = _picture_of_run(file) if of_run else None
     if mode is not None:
         modes, what = modes_of(packing, mode)
         load = f"F_x = {packing.fx:g}: " if packing.top.any() else ""
         yield "\n".join([f"{load}{what}", *(each.plain for each in modes)])
         figure = draw_modes(packing, modes, what)
-    elif frame is time is None and file.suffix != ".disks" and not holds_configuration(file):
-        figure = _picture_of_run(file)
-    if figure is None:
+    elif figure is None:
         yield in_words(packing)
         figure = draw_packing(packing, color=color, caption=True)
     save_as(figure, output)
@@ -112,11 +108,11 @@ def _picture_of_run(file: Path) -> Figure | None:
             return draw_drive(run.series(SERIES), slips_in(run)[0])
         if turning_points(run.fx):
             return draw_cycle([run.packing(k) for k in range(len(run))])
-        if growth := growth_in(run):
-            print_line(growth.says)
-            series = run.series("undamped")
-            return draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
-    return None
+        if not (growth := growth_in(run)):
+            return None
+        print_line(growth.says)
+        series = run.series("undamped")
+        return draw_growth(series["time"], series["msd"], growth.predicted, growth.measured)
 
 
 @command(f"{RAMPED} && faultgouge movie run.h5 -o ramp.gif", alone=True)
@@ -129,7 +125,7 @@ def movie(
     rate: Annotated[float, Option(min=1, max=60, help="Frames per second.")] = 10.0,
     span: Annotated[tuple[float, float] | None, Option(metavar="T0 T1", help="Times of the run to show.")] = None,
     dots: Annotated[int | None, Option(min=30, max=800, help="Dots per inch; 110 for .gif.")] = None,
-    output: Annotated[Path | None, Option("-o", "--output", help=OF_FILM)] = None,
+    output: Annotated[Path | None, Option("-o", "--output", help="film.mp4 or film.gif by default.")] = None,
 ) -> Results:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
@@ -146,19 +142,18 @@ def movie(
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
-    count, periods = max(2, round(seconds * rate)), max(1, round(seconds / 2))
-    packing = None if mode is None else stored_packing(file, frame)
+    count, packing = max(2, round(seconds * rate)), None if mode is None else stored_packing(file, frame)
     if packing is not None and packing.dimension == 3:
-        raise BadInputError(
-            f"{file} has spheres, and a film shows disks: `faultgouge view` shows their modes in motion, and "
-            "`faultgouge export --mode` has the vectors for ParaView (.vtp) and OVITO (.xyz)."
-        )
+        vectors = "`faultgouge export --mode` has the vectors for ParaView (.vtp) and OVITO (.xyz)"
+        shows = f"`faultgouge view` shows their modes in motion, and {vectors}"
+        raise BadInputError(f"{file} has spheres, and a film shows disks: {shows}.")
     check_name(output)
     with locked(output, file):
         if packing is None:
             film = _film_of_file(file, count, color, span, dots)
         else:
-            film = film_of_modes(packing, *modes_of(packing, str(mode)), count, periods=periods, dots=dots)
+            modes, periods = modes_of(packing, str(mode)), max(1, round(seconds / 2))
+            film = film_of_modes(packing, *modes, count, periods=periods, dots=dots)
         write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     yield "{} of {} x {} dots; written to {}".format(counted(count, "frame"), *film.size, output)
 
@@ -178,12 +173,12 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
         driven, shown, course = SERIES in run.names_of_series, [*range(len(run))], None
         if driven:
             first, last = span or (-inf, inf)
-            times = run.observable("time").tolist()
+            times = run.observable("time")
             shown = [k for k in shown if first <= times[k] <= last]
             if len(shown) < 2:
                 says = f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}"
                 raise PackingFileError(f"{says}, and a film shows two or more: give a longer --span")
-            course = Course.of_drive(run.series(SERIES), slips_in(run)[0], [times[k] for k in shown], first, last)
+            course = Course.of_drive(run.series(SERIES), slips_in(run)[0], times[shown].tolist(), first, last)
         packings = [run.packing(k) for k in shown]
     if len(packings) < 2:
         raise PackingFileError(f"{file} has one equilibrium and no trajectory: ask for a mode with --mode")
@@ -193,7 +188,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
 @command(f"{RAMPED} && faultgouge view run.h5 -o page.html", writes="file", alone=True)
 def view(
     file: Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback=refuse_scene)],
-    loads: Annotated[int | None, Option(min=1, help=OF_LOADS)] = None,
+    loads: Annotated[int | None, Option(min=1, help="Number of equilibria; by default 60 or fewer.")] = None,
     output: Annotated[Path, Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
 ) -> Results:
     """Make one page that any browser opens offline: is a packing stable, from load to load?

@@ -7,7 +7,7 @@ import re
 from dataclasses import asdict
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,7 +17,7 @@ from ..signal_guard import is_root, keeps
 from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_fallback, say, status
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing, RunFile
+    from faultgouge.analysis import RunFile
     from faultgouge.analysis.responses.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
 
@@ -50,10 +50,9 @@ def examples(
     scenes = files("faultgouge") / "scenes"
     shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
     if name is None:
-        for key, each in sorted(shelf.items()):  # its first two lines: what it shows, and the command that runs it
-            yield "{0:9} {2}\n{1:9} {3}".format(
-                key, "", *(line.strip('# "') for line in each.read_text().splitlines()[:2])
-            )
+        for key, each in sorted(shelf.items()):
+            shows, runs = (line.strip('# "') for line in each.read_text().splitlines()[:2])
+            yield f"{key:9} {shows}\n{'':9} {runs}"
         yield "\nfaultgouge examples NAME copies one into this folder."
         return
     # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
@@ -120,23 +119,21 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
         return
     with RunFile(output) as file:
         columns = {name: file.observable(name).tolist() for name in ("fx", "residual", "floor", "evaluations")}
-        columns["contacts"] = [len(file.packing(k).contacts) for k in range(len(file))]
-        columns["way"] = [*map(fallbacks(file).get, range(len(file)))]
-        turns = len(scene.ramp.turning_points) > 1
-        left = hysteresis([file.packing(k) for k in range(len(file))]) if turns else None
+        numbers, turns = range(len(file)), len(scene.ramp.turning_points) > 1
+        columns["contacts"] = [len(file.packing(k).contacts) for k in numbers]
+        columns["way"] = [*map(fallbacks(file).get, numbers)]
+        left = hysteresis([file.packing(k) for k in numbers]) if turns else None
     fx = columns["fx"][-1]
-    if fx != loads[-1]:
-        beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {fx:g}"
-        yield f"{beyond}: nothing is left to compute"
-    else:
+    if fx == loads[-1]:
         yield f"F_x = {fx:g} reached; residual force {columns['residual'][-1]:.2g}; written to {output}"
-    if left is not None:
-        yield f"F_x is back at {left.fx:g}" + (
-            ", and so is the upper layer: the path closes, to rounding"
-            if left.closes
-            else f": since F_x first had this value, the upper layer has moved by {left.remaining:.4g}, and the work "
-            f"of the loads is {left.work:.4g}"
-        )
+    else:
+        beyond = f"from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {fx:g}"
+        yield f"{output} goes on {beyond}: nothing is left to compute"
+    if left is not None and left.closes:
+        yield f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
+    elif left is not None:
+        moved = f"the upper layer has moved by {left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
+        yield f"F_x is back at {left.fx:g}: since F_x first had this value, {moved}"
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     yield {"equilibria": rows, "hysteresis": None if left is None else asdict(left)}
 
@@ -226,52 +223,45 @@ def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
     """
     from faultgouge.analysis import OutputError
     from faultgouge.analysis.files.atomic_write import check_output
-    from faultgouge.pywrap.runs.drive import NOISES
+    from faultgouge.pywrap import Equilibrium, Record
+    from faultgouge.pywrap.runs.drive import NOISES, check_drive, settle_for_drive
 
-    settings, table = scene.drive, output.with_suffix(".csv")
+    settings, table, runs = scene.drive, output.with_suffix(".csv"), {output: scene}
     assert settings is not None
     if table == output:
         raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
     check_output(table, output, head=",".join(SLIP_COLUMNS))
-    others: dict[Path, Scene] = {}
     if settings.signal is not None:  # runs without the signal, and with signals as small as noise
         noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
         for name, changed in ({"without": settings.without_signal()} | noises).items():
-            others[output.with_suffix(f".{name}{output.suffix}")] = scene.model_copy(update={"drive": changed})
-    for path in others:
-        check_output(path, output)
-    start = _drive(output, scene, "driving", others=others)
-    for path, other in others.items():
-        _drive(path, other, f"driving {path.name}", start)
+            path = output.with_suffix(f".{name}{output.suffix}")
+            check_output(path, output)
+            runs[path] = scene.model_copy(update={"drive": changed})
+    others, start = dict(list(runs.items())[1:]), None
+    for path, each in runs.items():  # the first makes the files of the others where the signal begins
+        with Record(path, each, task="drive", saved=keeps) as record:
+            if record.last is None:
+                if start is None:
+                    with status("settling") as show:
+                        start = settle_for_drive(scene, watch=lambda words: show(f"settling: {words}"))
+                    for warning in check_drive(scene, start):
+                        say(f"warning: {warning}")
+                record.append(Equilibrium.of(start))
+            assert record.last is not None
+            slips, start, what = (
+                record.slips,
+                record.last.packing,
+                "driving" if path == output else f"driving {path.name}",
+            )
+            with status(what) as show:
+                for step in record.drive(others if path == output else None):
+                    slips += step.slip is not None
+                    show(f"{what}: t = {step.sample.time:.4g}, F = {step.sample.force:.3g}, {counted(slips, 'slip')}")
+            record.finish()
+            start = record.last.packing
     if is_root():
         yield from _slips(scene, output, table, [*others])
-        yield f"written to {', '.join(map(str, [output, *others]))} and {table}"
-
-
-def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, others: Any = None) -> Packing:
-    """Run a drive to its end, from a packing or from the settled packing of the scene; returns the packing.
-
-    The files of other scenes, which differ in the signal, begin where the signal does.
-    """
-    from faultgouge.pywrap import Equilibrium, Record
-    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
-
-    with Record(output, scene, task="drive", saved=keeps) as record:
-        if record.last is None:
-            if start is None:
-                with status("settling") as show:
-                    start = settle_for_drive(scene, watch=lambda words: show(f"settling: {words}"))
-                for warning in check_drive(scene, start):
-                    say(f"warning: {warning}")
-            record.append(Equilibrium.of(start))
-        assert record.last is not None
-        with status(what) as show:
-            slips = record.slips
-            for step in record.drive(others):
-                slips += step.slip is not None
-                show(f"{what}: t = {step.sample.time:.4g}, F = {step.sample.force:.3g}, {counted(slips, 'slip')}")
-        record.finish()
-        return record.last.packing
+        yield f"written to {', '.join(map(str, runs))} and {table}"
 
 
 def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Results:
@@ -289,52 +279,43 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
     before = (np.searchsorted(times, [slip.begins for slip in slips], side="right") - 1).tolist()
     after = np.searchsorted(times, [slip.ends for slip in slips]).tolist()
-    ends = [{"frame_before": begin, "frame_after": end} for begin, end in zip(before, after, strict=True)]
-    rows = [asdict(slip) | frames for slip, frames in zip(slips, ends, strict=True)]
+    frames = zip(slips, before, after, strict=True)
+    rows = [asdict(slip) | {"frame_before": begin, "frame_after": end} for slip, begin, end in frames]
     write_csv(table, SLIP_COLUMNS, rows)
     friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
-    result = {
-        "slips": rows,
-        "under_way": None if under_way is None else asdict(under_way),
-        "cycles": max(0, len(slips) - 1),
-        "friction": asdict(friction),
-        "time": float(series["time"][-1]),
-        "states": len(times),
-        "strays": out,
-    }
+    result = {"slips": rows, "under_way": None if under_way is None else asdict(under_way), "strays": out}
+    result |= {"cycles": max(0, len(slips) - 1), "friction": asdict(friction), "states": len(times)}
+    result["time"] = float(series["time"][-1])
     if out:
-        squeezed = "squeezed out of the bed, above the layer, where no force acts: disks"
-        say(f"{squeezed} {', '.join(map(str, out))}; they were stopped there")
+        squeezed = f"squeezed out of the bed, above the layer, where no force acts: disks {', '.join(map(str, out))}"
+        say(f"{squeezed}; they were stopped there")
     time, mean, unended = f"t = {result['time']:.4g}", f"F/F_y is {friction.mean:.3g} on average", ""
     if under_way is not None:
-        unended = f": a slip that began at t = {under_way.begins:.4g} is under way, F has fallen from "
-        unended += f"{under_way.force_before:.4g} to {under_way.force_after:.4g}"
+        fallen = f"F has fallen from {under_way.force_before:.4g} to {under_way.force_after:.4g}"
+        unended = f": a slip that began at t = {under_way.begins:.4g} is under way, {fallen}"
     if slips:
         headings = [key.replace("force", "F").replace("_", " ") for key in SLIP_COLUMNS]
         yield table_of(headings, [[f"{row[key]:.4g}" for key in SLIP_COLUMNS] for row in rows])
         apart = (slips[-1].begins - slips[0].begins) / max(1, len(slips) - 1)
-        recurrence = f", one in {apart:.4g} units of time" if len(slips) > 1 else ""
-        yield (
-            f"{counted(len(slips), 'slip')} up to {time}{recurrence}; {mean} from the first slip on, "
-            f"{friction.before:.3g} before slips, {friction.after:.3g} after them{unended}"
+        many = f"{counted(len(slips), 'slip')} up to {time}" + (
+            f", one in {apart:.4g} units of time" if slips[1:] else ""
         )
+        around = f"{friction.before:.3g} before slips, {friction.after:.3g} after them"
+        yield f"{many}; {mean} from the first slip on, {around}{unended}"
     else:
         why = ", of a rigid drive, which counts no slips" if scene.drive.spring == "rigid" else unended or ": no slip"
         yield f"{time}{why}; {mean}, at most {friction.largest:.3g}"
     if others:
         without, *noisy = others
-        noise = [clock_advance(path, without) for path in noisy]
-        advance = clock_advance(output, without)
+        noise, advance = [clock_advance(path, without) for path in noisy], clock_advance(output, without)
         error = advance_error(noise, float(series["time"][1] - series["time"][0]))
         result |= {"clock_advance": advance, "clock_advance_error": error, "clock_advances_of_noise": noise}
-        if advance is None:
-            why = "no slip follows the signal, with or without it; let the run be longer"
-            yield f"clock advance: not known, since {why}"
-        else:
+        said = "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+        if advance is not None:
             side = "earlier" if advance >= 0 else "later"
-            within = "; with noise none follows in the run"
-            if error is not None:
-                alone = ", which noise alone may do" if abs(advance) <= error else ""
-                within = f", \u00b1 {error:.2g} (95 %, of {len(noise)} runs with noise of 1e-12){alone}"
-            yield f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal{within}"
+            said = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+            within = f", \u00b1 {error or 0.0:.2g} (95 %, of {len(noise)} runs with noise of 1e-12)"
+            said += "; with noise none follows in the run" if error is None else within
+            said += ", which noise alone may do" if error is not None and abs(advance) <= error else ""
+        yield said
     yield result

@@ -38,8 +38,7 @@ if TYPE_CHECKING:
 
 FINISHED = "{{output}} has the {} that were finished; the same command starts from the beginning and replaces them"
 TRIED = FINISHED.format("cases")
-OF_SHARD = "Only part K of N, for job arrays; each part needs its own folder."
-Shard = Annotated[str, Option(metavar="K/N", help=OF_SHARD)]
+Shard = Annotated[str, Option(metavar="K/N", help="Part K of N, for job arrays, in a folder of its own.")]
 
 
 def study_command(name: str) -> CommandInfo | None:
@@ -74,8 +73,8 @@ def study_command(name: str) -> CommandInfo | None:
                     yield from study.of_run(file, output, say, lambda rows, count: progress(rows, "states", count))
 
         run.__annotations__["file"] = Annotated[Path, Argument(metavar=metavar, help=help_)]
-    run.__doc__ = about.says
-    command(example, name=name, **made)(run)
+    run.__name__, run.__doc__ = name, about.says
+    command(example, **made)(run)
     return COMMANDS.pop(name)
 
 
@@ -140,10 +139,8 @@ def extremes(
     result = try_all(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result["cases"])
     yield result
-    yield (
-        f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
-        f"{counts['fails']} fail; written: {output}/extremes.md"
-    )
+    of = f"{counts['holds']} hold, {counts['refused']} are refused in a sentence, {counts['fails']} fail"
+    yield f"{counts.total()} cases: {of}; written: {output}/extremes.md"
     check(result)
 
 

@@ -8,22 +8,23 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
 
 import typer
 from typer import Argument, Option
 from typer.models import CommandInfo
 
-from ..signal_guard import holds, is_root, keeps
+from ..signal_guard import is_root, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -67,17 +68,6 @@ def refuse_scene(file: Path) -> Path:
     return file
 
 
-def one_of(*known: str) -> Callable[[str | None], str | None]:
-    """A check of an option that takes a few words."""
-
-    def check(word: str | None) -> str | None:
-        if word not in (None, *known):
-            raise typer.BadParameter(f"{word} is refused: give {' or '.join(known)}")
-        return word
-
-    return check
-
-
 OF_PACKING = "What `ramp`, `perturb`, `drive` or `import` has written (.h5), or NAME.disks from the dumps of a deck."
 PackingFile = Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback=refuse_scene)]
 
@@ -85,7 +75,6 @@ PackingFile = Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback
 def command(
     example: str,
     *,
-    name: str | None = None,
     reads: str | None = None,
     writes: str = "",
     kept: str = "",
@@ -101,8 +90,6 @@ def command(
     ----------
     example : str
         Of the help.
-    name : str, optional
-        Of the command; by default that of the function.
     reads : str, optional
         The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
     writes : {"", "file", "new", "run", "folder"}
@@ -116,7 +103,7 @@ def command(
     """
 
     def register(work: Callable[P, Results]) -> Callable[P, Results]:
-        own = inspect.signature(work)
+        own = inspect.signature(work, eval_str=True)
 
         @wraps(work)
         def run(as_json: bool = False, **given: Any) -> None:
@@ -128,12 +115,11 @@ def command(
             if reads is not None:
                 given["scene"] = scene = read_scene(given["scene"], reads)
                 inputs += [path for paths in scene.files.values() for path in paths]
-            with ExitStack() as held:
-                if writes and (output := given["output"]) is not None:
-                    held.enter_context(locked(output, *inputs, kind=writes))
-                    if kept:
-                        keeps(kept.format(output=output))
-                speak: Callable[[str], object] = (lambda line: None) if as_json else print_line
+            output = given["output"] if writes else None
+            speak: Callable[[str], object] = (lambda line: None) if as_json else print_line
+            with nullcontext() if output is None else locked(output, *inputs, kind=writes):
+                if kept:
+                    keeps(kept.format(output=output))
                 for result in work(**given):  # type: ignore[call-arg]
                     if isinstance(result, str):
                         speak(result)
@@ -141,15 +127,13 @@ def command(
                         print_line(json.dumps({FORMAT_KEY: FORMAT, **result}, indent=1))
                         speak = say
 
-        hints = get_type_hints(work, include_extras=True)
-        parameters = [each.replace(annotation=hints[key]) for key, each in own.parameters.items()]
-        if as_json:
-            flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
-            parameters.append(flag)
+        flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
+        parameters = [*own.parameters.values(), *([flag] if as_json else [])]
         vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
         run.__annotations__ = {each.name: each.annotation for each in parameters}
-        called = name or work.__name__
-        COMMANDS[called] = CommandInfo(called, callback=run, epilog=f"Example: {example}")
+        called, help_ = work.__name__.rstrip("_"), inspect.getdoc(work) or ""
+        first = " ".join(re.split(r"(?<=[.?])\s", help_)[0].split())  # the overview has it in full
+        COMMANDS[called] = CommandInfo(called, callback=run, short_help=first, epilog=f"Example: {example}")
         return work
 
     return register
@@ -173,7 +157,7 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
     Of the kind "new" it is not there yet; a "run" takes its lock itself; a "folder" is made. A table of the program
     begins with `head`.
     """
-    from faultgouge.analysis.files.atomic_write import check_output, lock_of, lock_output, make_folder
+    from faultgouge.analysis.files.atomic_write import check_output, lock_output, make_folder
 
     if kind == "new" and output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -184,8 +168,6 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
         return
     if kind == "folder":
         make_folder(output)
-    if lock := lock_of(output):
-        holds(lock)  # the guard removes the lock of a work that cannot do so itself
     with nullcontext() if kind == "run" else lock_output(output):
         yield
 
@@ -245,10 +227,7 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
 
     Off a terminal it is a line of the log, every minute. A thread says it: work may be within one call for longer.
     """
-    if not is_root():
-        yield lambda what: None
-        return
-    if sys.stderr.isatty():
+    if is_root() and sys.stderr.isatty():
         from rich.console import Console
 
         with Console(stderr=True).status(what) as line:

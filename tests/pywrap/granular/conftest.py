@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, TWO, command, instance, start, with_law
+from granular_packings import ALMOST_NONE, TWO, command, instance, on_slope, with_law
+
+import faultgouge
 
 
 @pytest.fixture
@@ -41,30 +43,31 @@ def beds(tmp_path_factory) -> Callable[..., Any]:
     made: dict[tuple[str, int, bool], Any] = {}
 
     def make(law: str, d: int, damped: bool = True):
-        from faultgouge.pywrap import from_lammps
-
         if (law, d, damped) in made:
             return made[law, d, damped]
-        lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
-        start(lmp, d, 20 if d == 3 else 18)
         # with 3 a contact of these disks comes to rest at the bound
         mu = "10.0" if (law, d, damped) == ("mindlin_rescale", 2, True) else "3.0"
-        with_law(lmp, law, d, "40", "40" if damped else ALMOST_NONE, ("0.2", "0.2" if damped else "1.0"), mu)
-        command(lmp, f"""
-fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-thermo 100000
-""")  # fmt: skip
+        dashpots, e = ("40", "40" if damped else ALMOST_NONE), ("0.2", "0.2" if damped else "1.0")
+        log = tmp_path_factory.mktemp("log") / "log.lammps"
+        lmp = made[law, d, damped] = on_slope(log, law, d, 0.1 if d == 3 else 0.05, dashpots, e, mu)
         for _ in range(12):
             lmp.command("run 20000")
-            found = from_lammps(lmp, balance=np.inf)
+            found = faultgouge.from_lammps(lmp, balance=np.inf)
             if found.residual < 1e-9 * found.contacts.normal_force.mean():
                 break
         if not damped:
             with_law(lmp, law, d, ALMOST_NONE, "", ("1.0", "1.0"), mu)
-        made[law, d, damped] = lmp
         return lmp
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def bed(beds):
+    """LAMMPS with particles at rest, none of whose contacts is at the bound, and their configuration."""
+
+    def make(law, d):
+        lmp = beds(law, d)
+        return lmp, faultgouge.from_lammps(lmp)
 
     return make

@@ -1,7 +1,9 @@
 """Packings of LAMMPS's own granular styles, and of ours, as a user's script sets them up."""
 
 import numpy as np
+import pytest
 
+RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
 LAWS = {
     "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
     "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
@@ -18,33 +20,29 @@ LAWS = {
         "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
         "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
     ),
-    "mindlin_rescale": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale 9e2 1.0 3.0",
-    ),
-    "mindlin_rescale/force": (
-        "granular", ["* * hertz 3e3 {g} tangential mindlin_rescale/force 9e2 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin_rescale/force 9e2 1.0 3.0",
-    ),
     "tsuji": (
         "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
         "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
     ),
+} | {
+    law: (
+        "granular", [f"* * hertz 3e3 {{g}} tangential {law} 9e2 1.0 3.0"],
+        f"granular hertz 3e3 {{w}} tangential {law} 9e2 1.0 3.0",
+    ) for law in RESCALED
 }  # fmt: skip
 """Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
 
 The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
 hundredth of a radius, so that velocities of 1e-5 are small beside them and large beside rounding."""
 
-RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
 ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
-def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3) -> str:
+def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3, units: str = "lj") -> str:
     """The first commands of a deck: spheres, or disks, in a box."""
     return f"""
-units lj
+units {units}
 dimension {dimension}
 atom_style sphere
 boundary {boundary}
@@ -58,14 +56,15 @@ create_box {kinds} box
 def deck(
     places, law: str, wall: str = "", *, box: str = "block -4 4 -4 4 -2 8", boundary: str = "f f f", dimension: int = 3,
     kinds=(), diameters=(1.0,), load: str = "0 0 -1", more: str = "fix move all nve/sphere", timestep: float = 1e-3,
-    run: str = "run 0",
+    run: str = "run 0", units: str = "lj", fill: str = "", density: str = "density 1.0",
 ) -> str:  # fmt: skip
-    """Particles of density 1 at some places, with one law for pairs and for the plane of a wall, as a wall names it."""
+    """Particles at some places, or by the commands of `fill`, with one law for pairs and for the plane of a wall, as a
+    wall names it."""
     granular, placed = law.startswith("granular "), zip(kinds or [1] * len(places), places, strict=True)
     return "\n".join([
-        head(box, boundary, kinds=len(diameters), dimension=dimension),
+        head(box, boundary, kinds=len(diameters), dimension=dimension, units=units), fill,
         *(f"create_atoms {k} single {x:.17g} {y:.17g} {z:.17g} units box" for k, (x, y, z) in placed),
-        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), "set group all density 1.0",
+        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), f"set group all {density}",
         "pair_style granular" if granular else f"pair_style gran/{law}",
         f"pair_coeff * * {law.removeprefix('granular ') if granular else ''}",
         f"fix floor all wall/gran {law} {wall}" if wall else "",
@@ -88,7 +87,7 @@ MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 
 
-def instance(*arguments: str):
+def instance(log=None):
     """LAMMPS on the ranks of this process, with the plugin."""
     from faultgouge.pywrap import Engine  # loads what is needed, in order
 
@@ -97,7 +96,14 @@ def instance(*arguments: str):
 
     from faultgouge.pywrap.lammps.instance import lammps_instance
 
-    return lammps_instance(MPI.COMM_WORLD, *arguments or (None,))
+    return lammps_instance(MPI.COMM_WORLD, log)
+
+
+def refused(says: str):
+    """Expects that a packing is refused with these words."""
+    from faultgouge.pywrap import NotTakenError
+
+    return pytest.raises(NotTakenError, match=says)
 
 
 def command(lmp, lines: str) -> None:
@@ -107,23 +113,10 @@ def command(lmp, lines: str) -> None:
 
 def start(lmp, d: int, count: int) -> None:
     """Particles of two sizes above a floor, in a sheared box of spheres, or one of disks."""
-    rng = np.random.default_rng(5)
-    width = 3.0 if d == 3 else 4.4
+    rng, width = np.random.default_rng(5), 3.0 if d == 3 else 4.4
     box = "prism 0 3 0 3 0 40 0.5 0 0" if d == 3 else "block 0 4.4 0 40 -0.5 0.5"
-    command(lmp, f"""
-units lj
-dimension {d}
-atom_style sphere
-atom_modify map array
-boundary {"p p f" if d == 3 else "p f p"}
-newton off
-comm_modify vel yes
-processors {"* * 1" if d == 3 else "* 1 *"}
-region box {box} units box
-create_box 2 box
-neighbor 0.2 bin
-neigh_modify every 1 delay 0 check yes
-""")  # fmt: skip
+    command(lmp, head(box, "p p f" if d == 3 else "p f p", kinds=2, dimension=d))
+    command(lmp, "neighbor 0.2 bin\nneigh_modify every 1 delay 0 check yes")
     across = int(width // 1.05)
     layer = across ** (d - 1)
     for k in range(count):
@@ -144,6 +137,37 @@ def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str 
     plane = "zplane" if d == 3 else "yplane"
     if w:
         lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+
+
+def on_slope(log, law: str, d: int, slope, dashpots=("40", "40"), e=("", ""), mu: str = "3.0", run: int = 0):
+    """LAMMPS with particles that come to rest on a slope."""
+    lmp = instance(log)
+    start(lmp, d, 20 if d == 3 else 18)
+    with_law(lmp, law, d, *dashpots, e, mu)
+    command(lmp, f"""
+fix load all gravity 1.0 vector {slope} {"0 -1" if d == 3 else "-1 0"}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+run {run} post no
+""")  # fmt: skip
+    return lmp
+
+
+def is_proved(found, operators: str, error: float = 1e-5) -> None:
+    """K and C are those of laws, or differences, and LAMMPS moves as they say."""
+    assert found.operators == operators
+    assert max(found.operator_error, found.proof) < error
+
+
+def agree(found, other, of_k: float = 1e-5, of_c: float = 1e-6) -> None:
+    """K and C are those of another configuration, as shares of the largest entry."""
+    from faultgouge.analysis import damping_matrix, stiffness_matrix
+
+    for matrix, share in ((stiffness_matrix, of_k), (damping_matrix, of_c)):
+        one, expected = matrix(found), matrix(other)
+        assert abs(one - expected).max() <= share * abs(expected).max()
 
 
 def of_particle(lmp, name: str, number: int) -> np.ndarray:

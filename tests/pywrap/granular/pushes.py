@@ -3,6 +3,8 @@
 from itertools import islice
 
 import numpy as np
+import pytest
+from granular_packings import command
 
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
 
@@ -15,29 +17,54 @@ def velocities(here, push):
     return [column.reshape(here.axes, len(here))[: here.dimension].T for column in push.T]
 
 
-def pushed(lmp, here, push, times, dt, size=PUSH):
-    """D of LAMMPS's particles over the push squared: shape (T, P) for pushes of all coordinates, shape (.., P)."""
-    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
+def in_a_quiet_copy(lmp, work, lines=""):
+    """What some work returns in a copy of LAMMPS without drag and output, after some commands."""
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
 
-    def follow(velocity):
+    def follow():
         lmp.command("log none")
         quieten(lmp, drag=True)
-        lmp.command(f"timestep {dt}")
-        at_rest = owned_array(lmp, "x")[rows_of(lmp, here)].copy()
+        command(lmp, lines)
+        return work()
+
+    return in_a_copy(follow)
+
+
+def places(lmp, here):
+    """Positions of LAMMPS's particles, in the order of those of a configuration."""
+    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of
+
+    return owned_array(lmp, "x")[rows_of(lmp, here)].copy()
+
+
+def pushed(lmp, here, push, times, dt, size=PUSH):
+    """D of LAMMPS's particles over the push squared: shape (T, P) for pushes of all coordinates, shape (.., P)."""
+    from faultgouge.pywrap.granular.lammps_arrays import set_velocity
+
+    low, high, *_ = lmp.extract_box()
+
+    def follow(velocity):
+        at_rest, found, steps = places(lmp, here), [], 0
         set_velocity(lmp, here, size * velocity)
-        found, steps = [], 0
-        low, high, *_ = lmp.extract_box()
-        width = np.subtract(high, low)
         for time in times:
             lmp.command(f"run {round(time / dt) - steps} post no")
             steps = round(time / dt)
-            away = owned_array(lmp, "x")[rows_of(lmp, here)] - at_rest
-            away[:, 0] -= width[0] * np.round(away[:, 0] / width[0])
+            away = places(lmp, here) - at_rest
+            away[:, 0] -= (high[0] - low[0]) * np.round(away[:, 0] / (high[0] - low[0]))
             found.append(float(np.mean(np.sum(away**2, axis=1))) / size**2)
         return found
 
-    return np.transpose([in_a_copy(lambda v=v: follow(v)) for v in push.T])
+    return np.transpose([in_a_quiet_copy(lmp, lambda v=v: follow(v), f"timestep {dt}") for v in push.T])
+
+
+def moves_alike(lmp, found, time) -> None:
+    """LAMMPS moves as K and C say, extrapolated to a step of zero: dashpots feel the velocity of half steps."""
+    from faultgouge.pywrap import compare_motion
+
+    runs = [compare_motion(lmp, found, time, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
 
 
 def in_steps(here, push, times, dt):

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from granular_packings import HERTZ, MOVES, command
+from granular_packings import HERTZ, MOVES, command, refused
+
+import faultgouge
 
 WALL = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
 OPEN = r"The line of fix w wall/gran does not say where the wall is: give all of"
@@ -20,42 +22,19 @@ TABLE = [
     (MOVES, {"1e5": "${kn}"}, "has a variable: write its number"),
     (MOVES, {"pair_style": "# "}, "no pair_style"),
     (MOVES, {"* *": "A A"}, r"do not stand alone \(LAMMPS stopped: .*\): give the lines"),
-    (WALL + MOVES, {WALL: "fix w all wall/gran"}, OPEN),
-    (WALL + MOVES, {" zplane 0 NULL": ""}, OPEN),
-    (WALL + MOVES, {" 0 NULL": ""}, OPEN),
+    *((WALL + MOVES, {cut: ""}, OPEN) for cut in (WALL[len("fix w all wall/gran") :], " zplane 0 NULL", " 0 NULL")),
 ]
 
 
 @pytest.mark.parametrize(("more", "changes", "says"), TABLE)
 def test_what_is_refused(two, more, changes, says):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
     lmp, told = two(HERTZ, "* *", more.strip())
     text = "\n".join(told)
     for before, after in (changes or {}).items():
         text = text.replace(before, after)
-    with pytest.raises(NotTakenError, match=says) as refusal:
-        from_lammps(lmp, None if changes is None else text)
+    with refused(says) as refusal:
+        faultgouge.from_lammps(lmp, None if changes is None else text)
     assert "\n" not in str(refusal.value)
-
-
-def test_one_text_is_as_good_as_many_lines(two):
-    """A comment is none of the command."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    whole = from_lammps(lmp, "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"]), balance=np.inf)
-    assert whole == from_lammps(lmp, told, balance=np.inf)
-
-
-def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path):
-    """A log of the command `log` does not begin with the version of LAMMPS."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.command(f'log "{tmp_path}/own.log"')
-    command(lmp, "\n".join(told))
-    assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
 
 
 PRINTS = '''print "pair_style gran/hooke/history 1 1 1 1 1 1"
@@ -69,37 +48,29 @@ clear
 fix move all nve/limit 1
 """
 '''
+RUNS = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
 
 
-def test_what_a_deck_prints_is_no_command(two, tmp_path):
-    from faultgouge.pywrap import from_lammps
-
+@pytest.mark.parametrize("more", ["pair_coeff * *", PRINTS, f"pair_coeff * *\n{RUNS}"], ids=["log", "print", "runs"])
+def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path, more):
+    """A log of the command `log` does not begin with the version of LAMMPS. What a deck prints is no command, nor what
+    `fix print` writes in runs, at their beginning, too."""
     lmp, told = two(HERTZ, "* *", MOVES.strip())
-    (tmp_path / "deck.in").write_text("\n".join([f"log {tmp_path}/own.log", told[0], *told[2:], PRINTS]))
+    (tmp_path / "deck.in").write_text("\n".join([f"log {tmp_path}/own.log", told[0], *told[2:], more, ""]))
     lmp.file(str(tmp_path / "deck.in"))
-    assert from_lammps(lmp, balance=np.inf) == from_lammps(lmp, told, balance=np.inf)
+    # one text is as good as many lines, and a comment is none of the command
+    text = "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"])
+    found = faultgouge.from_lammps(lmp, balance=np.inf)
+    assert (
+        found == faultgouge.from_lammps(lmp, told, balance=np.inf) == faultgouge.from_lammps(lmp, text, balance=np.inf)
+    )
+    assert found.free.all()  # by fix move
 
 
 def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     """The commands in it may be those of the other one."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
     lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.command(f'log "{tmp_path}/log.lammps"')
-    command(lmp, "\n".join(told))
+    command(lmp, "\n".join([f'log "{tmp_path}/log.lammps"', *told]))
     lammps_with()
-    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
-        from_lammps(lmp, balance=np.inf)
-
-
-def test_what_runs_write_into_a_log_is_no_command(two, tmp_path):
-    """`fix print` may print anything, at the beginning of a run, too."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.command(f'log "{tmp_path}/own.log"')
-    prints = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
-    command(lmp, "\n".join([*told, prints]))
-    found = from_lammps(lmp, balance=np.inf)
-    assert len(found) == 2
-    assert found.free.all()  # by fix move
+    with refused(r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
+        faultgouge.from_lammps(lmp, balance=np.inf)

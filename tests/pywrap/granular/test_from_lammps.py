@@ -3,17 +3,31 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, HERTZ, LAWS, MOVES, RESCALED, TWO, command, deck, start
+from granular_packings import (
+    ALMOST_NONE,
+    HERTZ,
+    LAWS,
+    MOVES,
+    RESCALED,
+    TWO,
+    agree,
+    command,
+    deck,
+    head,
+    is_proved,
+    refused,
+    start,
+)
 from packing_snapshot import snapshot_of
 
-from faultgouge.analysis import damping_matrix, largest_frequency, stable_timestep, stiffness_matrix
+import faultgouge
+from faultgouge.analysis import largest_frequency, stable_timestep, stiffness_matrix
 
 FAST = ("gran/hertz/history", True, 3), ("mindlin", False, 2)
-
-
 CASES = [
     pytest.param(
         law, damped, d, id=f"{law}-{'dashpots' if damped else 'elastic'}-{d}",
@@ -27,34 +41,28 @@ CASES = [
 @pytest.mark.parametrize(("law", "damped", "d"), CASES)
 def test_motion_of_lammps(beds, law, damped, d):
     """The difference falls as the square of the time step, or in proportion to it with dashpots, down to 1e-6."""
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import compare_motion
 
     lmp = beds(law, d, damped)
-    configuration = from_lammps(lmp)
-    contacts = configuration.contacts
-    assert len(contacts) > len(configuration)
-    assert configuration.damped
+    bed = faultgouge.from_lammps(lmp)
+    assert (bed.damped, bed.contacts.at_bound.any(), len(bed.contacts) > len(bed)) == (True, False, True)
     steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
     # displacements are a fifth of these velocities: no contact opens, nor do the forces of Hertz need more than cubic
     # terms
     hertz = "hertz" in LAWS[law][0] + LAWS[law][1][0]
-    large = min(3.2e-4, (0.5 if hertz else 4.0) * float(contacts.overlap.min()))
+    large = min(3.2e-4, (0.5 if hertz else 4.0) * float(bed.contacts.overlap.min()))
     if law in RESCALED and d == 2:
         large *= 3.0 if damped else 2.0  # the terms of second order go below, too
-    assert not contacts.at_bound.any()
     # extrapolated to no amplitude, without the forces' cubic terms, so that the amplitude can be large beside that of
     # 1e-10 of Coulomb's bound, below which `granular` does not turn a history. With two derivatives the motions from
     # both signs are not opposite, and terms of second order stay in half of their difference, too
     weights = np.array([1, -12, 32]) / 3 if law in RESCALED else np.array([-1, 8]) / 3
-    runs = [
-        [compare_motion(lmp, configuration, 0.2, large / 2**k, timestep=h) for k in range(len(weights))] for h in steps
-    ]
+    runs = [[compare_motion(lmp, bed, 0.2, large / 2**k, timestep=h) for k in range(len(weights))] for h in steps]
     predicted = runs[0][0].linear_velocity / large
     linear = [sum(w * run.velocity for w, run in zip(weights, each, strict=True)) / large for each in runs]
     size = np.linalg.norm(predicted)
     error = [np.linalg.norm(each - predicted) / size for each in linear]
-    order = 1 if damped else 2
-    assert error[1] / error[2] == pytest.approx(2**order, rel=0.1)
+    assert error[1] / error[2] == pytest.approx(2 if damped else 4, rel=0.1)
     # extrapolated to a step of zero, too: without the terms in h and h^2, or in h^2 and h^4
     first, second, third = linear[1:]
     rest = (8 * third - 6 * second + first) / 3 if damped else (64 * third - 20 * second + first) / 45
@@ -68,13 +76,11 @@ def test_motion_of_lammps(beds, law, damped, d):
 )  # fmt: skip
 def test_b_of_two_spheres(two, law, closing, parting):
     """d ln f_t / d ln delta as the table of the page says, of two spheres that have slipped."""
-    from faultgouge.pywrap import from_lammps
-
     style, coefficients, _ = LAWS[law]
     lmp, told = two(style.format(g=ALMOST_NONE), coefficients[0].format(g=ALMOST_NONE, e="1.0"), MOVES.strip())
     lmp.numpy.extract_atom("omega")[0, 0] = 1e-2
     lmp.command("run 1 post no")
-    c = from_lammps(lmp, told, balance=np.inf, prove=False).contacts
+    c = faultgouge.from_lammps(lmp, told, balance=np.inf, prove=False).contacts
     (force,), (overlap,) = c.tangential_force, c.overlap
     assert np.linalg.norm(force) > 0
     assert c.closing[0] == pytest.approx(closing * force / overlap, rel=1e-9, abs=1e-12)
@@ -83,7 +89,7 @@ def test_b_of_two_spheres(two, law, closing, parting):
 
 def test_an_error_in_a_copy_is_that_of_this_process():
     """It is not laid to LAMMPS."""
-    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+    from faultgouge.pywrap import in_a_copy
 
     with pytest.raises(ZeroDivisionError, match="division by zero"):
         in_a_copy(lambda: 1 / 0)
@@ -92,14 +98,12 @@ def test_an_error_in_a_copy_is_that_of_this_process():
 @pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
 def test_spheres_that_barely_touch(two, law):
     """An overlap of 1e-12 has lost twelve digits, from which no law can be measured."""
-    from faultgouge.pywrap import from_lammps
-
     style, coefficients, _ = LAWS[law]
-    lmp, told = two(style.format(g="40"), ";".join(coefficients[:1]).format(g="40"), MOVES.strip())
+    lmp, told = two(style.format(g="40"), coefficients[0].format(g="40"), MOVES.strip())
     lmp.numpy.extract_atom("radius")[:2] = 0.37, 0.41
     lmp.numpy.extract_atom("x")[:2] = [[0, 0, 1.0], [0, 0, 1.78 - 1e-12]]
     lmp.command("run 0")
-    (contact,) = from_lammps(lmp, told, balance=np.inf).contacts.overlap
+    (contact,) = faultgouge.from_lammps(lmp, told, balance=np.inf).contacts.overlap
     assert contact == pytest.approx(1e-12, rel=1e-3)
 
 
@@ -109,32 +113,26 @@ def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
     Forces of the other sign, which no known release has, are noticed by the torques, and K is then found by differences
     of the forces on particles.
     """
-    from faultgouge.pywrap import from_lammps
     from faultgouge.pywrap.granular import looks as module
 
     lmp = beds("gran/hertz/history", 3, True)
-    found, look = from_lammps(lmp), module.arrays_at_rest
+    found, look = faultgouge.from_lammps(lmp), module.arrays_at_rest
     between = found.position[found.contacts.i] - found.position[found.contacts.j]
     assert np.any((np.linalg.norm(between, axis=1) > 1) & ~found.contacts.wall)
 
-    def turned(*arguments):
-        arrays = look(*arguments)
-        arrays["contacts"][::2, :3] *= -1
-        return arrays
+    def turned(columns):
+        def arrays_at_rest(*arguments):
+            arrays = look(*arguments)
+            arrays["contacts"][::2, columns] *= -1
+            return arrays
 
-    monkeypatch.setattr(module, "arrays_at_rest", turned)
-    assert from_lammps(lmp) == found
+        monkeypatch.setattr(module, "arrays_at_rest", arrays_at_rest)
+        return faultgouge.from_lammps(lmp)
 
-    def reversed_forces(*arguments):
-        arrays = look(*arguments)
-        arrays["contacts"][::2, 4:] *= -1
-        return arrays
-
-    monkeypatch.setattr(module, "arrays_at_rest", reversed_forces)
-    by_differences = from_lammps(lmp)
-    assert by_differences.operators == "differences"
-    exact = stiffness_matrix(found)
-    assert abs(stiffness_matrix(by_differences) - exact).max() < 1e-5 * abs(exact).max()
+    assert turned(slice(3)) == found
+    by_differences = turned(slice(4, None))
+    is_proved(by_differences, "differences")
+    agree(by_differences, found)
 
 
 PLAIN = """
@@ -163,15 +161,11 @@ def test_a_lammps_without_the_plugin(tmp_path):
 @pytest.mark.parametrize("model", ["mindlin", "mindlin_classic"])
 def test_soft_and_stiff_springs(two, model, kt):
     """Coulomb's bound of a spring 1e4 times softer than the normal one, and stiffness of one 1e4 times stiffer."""
-    from faultgouge.pywrap import from_lammps
-
     law = f"hertz 1e5 0 tangential {model} {kt} 0 0.5"
-    wall = f"fix w all wall/gran granular {law} zplane 0 NULL contacts"
-    lmp, told = two("granular", f"* * {law}", wall + MOVES)
-    found = from_lammps(lmp, told, balance=np.inf)
+    lmp, told = two("granular", f"* * {law}", f"fix w all wall/gran granular {law} zplane 0 NULL contacts{MOVES}")
+    found = faultgouge.from_lammps(lmp, told, balance=np.inf)
     c = found.contacts
-    assert found.remarks == ()
-    assert len(c) == 2
+    assert (found.remarks, len(c)) == ((), 2)
     radius = np.where(c.wall, 0.5, 0.25)
     # roundings of forces
     assert c.friction == pytest.approx(0.5 * c.normal_force, rel=1e-9)
@@ -181,150 +175,109 @@ def test_soft_and_stiff_springs(two, model, kt):
 def test_the_last_line_of_two_types_holds(two):
     """The first let the particles settle without friction, and would be taken by differences, with a remark; and a
     dashpot of 0 is none, with any way to take steps."""
-    from faultgouge.pywrap import from_lammps
-
     first = "* * hertz 1e5 1 tangential linear_nohistory 1.0 0.0"
     last = "* * hertz 1e5 0 tangential mindlin 3e4 1.0 0.5 damping mass_velocity synchronized_verlet"
     found = []
     for lines in (f"{first};{last}", last, first):
         lmp, told = two("granular", lines, MOVES.strip())
-        found.append(from_lammps(lmp, told, balance=np.inf))
+        found.append(faultgouge.from_lammps(lmp, told, balance=np.inf))
     assert found[0] == found[1]
-    assert [each.operators for each in found] == ["laws", "laws", "differences"]
-    assert not found[0].damped
+    assert [(each.operators, each.damped) for each in found[1:]] == [("laws", False), ("differences", True)]
     assert "tangential linear_nohistory keeps no history" in found[2].remarks[0]
 
 
 def test_a_lattice_whose_spheres_just_touch(lammps_with):
     """Overlaps of rounding are no contacts, and there is nothing to compare a motion with."""
-    from faultgouge.pywrap import NotTakenError, compare_motion, from_lammps
+    from faultgouge.pywrap import compare_motion
 
-    lmp = lammps_with(f"""
-units si
-atom_style sphere
-boundary p p p
-newton off
-comm_modify vel yes
-lattice fcc {2**0.5}
-region box block 0 2 0 2 0 2
-create_box 1 box
-create_atoms 1 box
-set group all diameter 1.0 density 1.0
-pair_style {HERTZ}
-pair_coeff * *
-fix move all nve/sphere
-run 0
-""")
-    found = from_lammps(lmp)
-    assert len(found) == 32
-    assert len(found.contacts) == 0
-    with pytest.raises(NotTakenError, match="Nothing that moves has a contact"):
+    lattice = (
+        head("block 0 2 0 2 0 2", "p p p").replace("region", f"lattice fcc {2**0.5}\nregion").replace(" units box", "")
+    )
+    law = f"pair_style {HERTZ}\npair_coeff * *{MOVES}\nrun 0"
+    lmp = lammps_with(f"{lattice}create_atoms 1 box\nset group all diameter 1.0 density 1.0\n{law}")
+    found = faultgouge.from_lammps(lmp)
+    assert (len(found), len(found.contacts)) == (32, 0)
+    with refused("Nothing that moves has a contact"):
         compare_motion(lmp, found, 1.0, 1e-6)
 
 
 def test_what_is_said_of_spheres_that_fall_or_grow(lammps_with):
     """No histories are lost where friction cannot bear the weight, and fix adapt may do anything in the next run."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
     deck = TWO.replace("atom_style sphere", "atom_style sphere 1") + f"pair_style {HERTZ}\npair_coeff * *{MOVES}\n"
     lmp = lammps_with(deck + "fix load all gravity 1e9 vector 0 0 -1\nrun 0")
-    with pytest.raises(NotTakenError, match="The packing moves") as refusal:
-        from_lammps(lmp)
+    with refused("The packing moves") as refusal:
+        faultgouge.from_lammps(lmp)
     assert "histories" not in str(refusal.value)
     command(lmp, "variable size equal 1+1e-9*step\nfix grow all adapt 1 atom diameter v_size\nrun 0")
-    assert from_lammps(lmp, balance=np.inf).remarks[0].startswith("fix grow (adapt) may change sizes or laws as LAMMPS")
+    (remark,) = faultgouge.from_lammps(lmp, balance=np.inf).remarks
+    assert remark.startswith("fix grow (adapt) may change sizes or laws as LAMMPS")
 
 
 def test_two_spheres_that_touch_twice(lammps_with):
     """LAMMPS has one history for both contacts, so that no run brings such a packing to rest."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    lmp = lammps_with(
-        deck([(0.5, 0, 0), (1.43, 0, 0)], HERTZ[5:], box="block 0 1.9 -4 4 -4 4", boundary="p f f", load="")
-    )
-    assert len(from_lammps(lmp, balance=np.inf).contacts) == 2
-    with pytest.raises(NotTakenError, match=r"touch each other twice.* take a box that is wider"):
-        from_lammps(lmp)
+    slot = deck([(0.5, 0, 0), (1.43, 0, 0)], HERTZ[5:], box="block 0 1.9 -4 4 -4 4", boundary="p f f", load="")
+    lmp, says = lammps_with(slot), r"touch each other twice.* take a box that is wider"
+    assert len(faultgouge.from_lammps(lmp, balance=np.inf).contacts) == 2
+    with refused(says):
+        faultgouge.from_lammps(lmp)
     # the history of one of them has a part along the normal of the other
     lmp.numpy.extract_atom("v")[1] = [0.0, 1.0, 0.5]
     lmp.command("run 5 post no")
-    with pytest.raises(NotTakenError, match=r"touch each other twice.* take a box that is wider"):
-        from_lammps(lmp, balance=np.inf, differences=True)
+    with refused(says):
+        faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
 
 
 def test_frozen_particles_and_inertia(two):
-    """What fix freeze holds has no rows in K; LAMMPS's discs have another moment of inertia."""
-    from faultgouge.pywrap import from_lammps
-
-    more = "group still id 1\nfix hold still freeze\nfix move all nve/sphere"
-    lmp, told = two(HERTZ, "* *", more)
-    found = from_lammps(lmp, told, balance=np.inf)
+    """What fix freeze holds has no rows in K, and LAMMPS's effective mass is then that of the other particle."""
+    lmp, told = two(HERTZ, "* *", "group still id 1\nfix hold still freeze\nfix move all nve/sphere")
+    found = faultgouge.from_lammps(lmp, told, balance=np.inf)
     assert list(found.free) == [False, True]
     assert found.inertia == pytest.approx(0.4 * found.mass * 0.25)
-    k = stiffness_matrix(found).toarray()
-    assert not k[::2].any()
-    assert k[1::2, 1::2].any()
-    # LAMMPS's effective mass is then that of the other particle
-    assert found.contacts.normal_dashpot == pytest.approx(
-        1.0 * found.mass[1] * np.sqrt(0.25 * found.contacts.overlap), rel=1e-9
-    )
+    k, overlap = stiffness_matrix(found).toarray(), found.contacts.overlap
+    assert (k[::2].any(), k[1::2, 1::2].any()) == (False, True)
+    assert found.contacts.normal_dashpot == pytest.approx(found.mass[1] * np.sqrt(0.25 * overlap), rel=1e-9)
 
 
 def test_our_own_style(lammps_with):
     """A packing of mindlin/smooth is the Packing that the decks' own way gives."""
-    from dataclasses import replace
-
     from faultgouge.analysis import Contacts, MindlinLaw, Packing
-    from faultgouge.pywrap import from_lammps
 
     lmp = lammps_with(log=None)
     start(lmp, 2, 8)
     told = ["pair_style mindlin/smooth 2e5 6e4 0.5 damping 10 5", "pair_coeff * *",
             "fix floor all wall/mindlin/smooth 2e5 6e4 0.5 ylo 0.0 damping 10 5",
             "fix move all nve/disc 0.5"]  # fmt: skip
-    command(
-        lmp,
-        "\n".join(
-            [*told, "fix load all gravity 1 vector 0.2 -1 0", "fix drag all viscous 1", "timestep 0.001", "run 9000"]
-        ),
-    )
-    found = from_lammps(lmp, told, balance=np.inf)
+    more = "fix load all gravity 1 vector 0.2 -1 0\nfix drag all viscous 1\ntimestep 0.001\nrun 9000"
+    command(lmp, "\n".join([*told, more]))
+    found = faultgouge.from_lammps(lmp, told, balance=np.inf)
     c = found.contacts
-    assert c.wall.any()
-    assert (~c.wall).any()
+    assert 0 < c.wall.sum() < len(c)
     law = MindlinLaw(2e5, 6e4, 0.5, cn=10, ct=5)
     # the slips, from the forces: LAMMPS's own numbers are not asked twice
-    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
-    force = np.einsum("ca,ca->c", c.tangential_force[:, :2], tangent)
-    limit = law.slip_limit(c.overlap)
+    force = np.einsum("ca,ca->c", c.tangential_force[:, :2], np.column_stack([-c.normal[:, 1], c.normal[:, 0]]))
     x = np.linspace(-1, 1, 200_001)
-    slip = np.interp(-force / (law.mu * c.normal_force), np.sign(x) * (np.abs(x) + x**2 - np.abs(x) ** 3), x) * limit
+    share = np.interp(-force / (law.mu * c.normal_force), np.sign(x) * (np.abs(x) + x**2 - np.abs(x) ** 3), x)
     packing = Packing(position=found.position, radius=found.radius, mass=found.mass, inertia_factor=0.5, law=law,
-                      box_length=4.4, contacts=Contacts(c.i, c.j, slip))  # fmt: skip
-    one, other = stiffness_matrix(packing), stiffness_matrix(found)
-    # x on a grid of 1e-5, to second order
-    assert abs(one - other).max() < 1e-8 * abs(one).max()
+                      box_length=4.4, contacts=Contacts(c.i, c.j, share * law.slip_limit(c.overlap)))  # fmt: skip
+    agree(found, packing, 1e-8, 1e-8)  # x on a grid of 1e-5, to second order
     calm = replace(packing, law=replace(law, cn=0, ct=0))
-    assert abs(stiffness_matrix(snapshot_of(calm)) - one).max() < 1e-14 * abs(one).max()
-    assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
+    agree(snapshot_of(calm), calm, 1e-14, 0.0)
 
 
 @pytest.mark.slow
 def test_a_comparison_that_proves_nothing_is_refused(beds):
     """And a comparison says over how many periods it went."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import compare_motion
 
     lmp = beds("gran/hertz/history", 3, True)
-    bed = from_lammps(lmp)
+    bed = faultgouge.from_lammps(lmp)
     good = {"time": 0.2, "amplitude": 1e-5, "timestep": 1e-4}
-    wrong = {"time": (-1.0, 0.0, np.nan, np.inf), "timestep": (-1e-4, 0.0, np.nan), "amplitude": (0.0, np.nan, np.inf)}
-    for name, values in wrong.items():
-        for value in values:
-            with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
-                compare_motion(lmp, bed, **(good | {name: value}))
+    for name, value in (("time", -1.0), ("time", np.inf), ("timestep", 0.0), ("amplitude", np.nan)):
+        with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
+            compare_motion(lmp, bed, **(good | {name: value}))
     with pytest.raises(BadInputError, match="balance = nan is refused"):
-        from_lammps(lmp, balance=np.nan)
+        faultgouge.from_lammps(lmp, balance=np.nan)
     found = compare_motion(lmp, bed, **good)
     assert found.periods == pytest.approx(0.2 * largest_frequency(bed) / (2 * np.pi), rel=1e-9)
     assert "after t = 0.2, 1." in str(found)
@@ -334,13 +287,12 @@ def test_a_comparison_that_proves_nothing_is_refused(beds):
 @pytest.mark.parametrize("law", ["gran/hertz/history", pytest.param("mindlin", marks=pytest.mark.long)])
 def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds, law):
     """Within half a per cent, by dashpots that take a tenth of the step."""
-    from faultgouge.pywrap import compare_motion, from_lammps
+    from faultgouge.pywrap import compare_motion
 
     lmp = beds(law, 3, True)
-    bed = from_lammps(lmp)
-    limit = stable_timestep(bed)
+    bed = faultgouge.from_lammps(lmp)
+    limit, size = stable_timestep(bed), {}
     assert limit < 0.95 * stable_timestep(largest_frequency(bed))
-    size = {}
     for share in (0.995, 1.005):
         motion = compare_motion(lmp, bed, 120 * share * limit, 1e-9, timestep=share * limit)
         size[share] = np.linalg.norm(motion.velocity) / (1e-9 * len(motion.velocity) ** 0.5)
@@ -351,32 +303,14 @@ def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds
 @pytest.mark.parametrize("width", [0.95, 1.49])
 def test_a_narrow_slot(two, width):
     """The law of a wall of two planes is that of one of them, however near the other one is."""
-    from faultgouge.pywrap import from_lammps
-
-    wall = f"fix w all wall/gran hertz/history 1e5 3e4 1 1 0.5 1 zplane {{}} {width} contacts"
-    found = []
+    wall, found = f"fix w all wall/gran hertz/history 1e5 3e4 1 1 0.5 1 zplane {{}} {width} contacts", []
     for lower in ("0", "NULL"):
         lmp, told = two(HERTZ, "* *", wall.format(lower) + MOVES)
         lmp.numpy.extract_atom("x")[:2] = [[0, 0, width - 0.45], [0, 3, width - 0.452]]
         lmp.command("run 0")
-        found.append(from_lammps(lmp, told, balance=np.inf).contacts)
+        found.append(faultgouge.from_lammps(lmp, told, balance=np.inf).contacts)
     one, other = found
     assert len(one) == 2
     assert one.tangential_stiffness == pytest.approx(3e4 * np.sqrt(0.5 * one.overlap), rel=1e-9)
     for name in ("overlap", "normal_stiffness", "tangential_stiffness", "normal_dashpot", "friction"):
         assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-9)
-
-
-def test_what_moves_may_be_looked_at(two, tmp_path):
-    """Two spheres that graze each other, and that have parted: whatever is out of balance is allowed."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.numpy.extract_atom("v")[1] = [0.0, 100.0, 0.0]
-    lmp.command("timestep 1e-4")
-    touching = []
-    for _ in range(3):
-        touching.append(len(from_lammps(lmp, told, balance=np.inf).contacts))
-        lmp.command("run 40 post no")
-    assert touching[0] == 1
-    assert touching[-1] == 0

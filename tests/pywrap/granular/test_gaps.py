@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from granular_packings import command, deck, of_particle
 
+import faultgouge
 from faultgouge.analysis import one_sided_motion, stability
+from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.operators.gaps import gaps_of
 
 GAP = 1e-6
@@ -19,42 +21,28 @@ ROW = deck(
 
 @pytest.fixture
 def row(lammps_with):
-    from faultgouge.pywrap import from_lammps
-
-    lmp = lammps_with()
-    command(lmp, ROW)
-    return lmp, from_lammps(lmp)
+    lmp = lammps_with(ROW)
+    return lmp, faultgouge.from_lammps(lmp)
 
 
 def test_gaps_are_those_of_the_row(row):
     _, here = row
     found = gaps_of(here)
-    pairs = {frozenset((int(i), int(j))): gap for i, j, gap in zip(found.i, found.j, found.gap, strict=True)}
-    assert pairs == {
-        frozenset((0, 1)): pytest.approx(GAP, rel=1e-6),
-        frozenset((1, 2)): pytest.approx(1.5 * GAP, rel=1e-6),
-        frozenset((2, 0)): pytest.approx(0.5 * GAP, rel=1e-6),
-    }
-    closing = found.rates(here)
-    assert closing.shape == (3, here.coordinates)
+    gaps = {tuple(sorted((int(i), int(j)))): gap for i, j, gap in zip(found.i, found.j, found.gap, strict=True)}
+    assert gaps == pytest.approx({(0, 1): GAP, (1, 2): 1.5 * GAP, (0, 2): 0.5 * GAP}, rel=1e-6)
     moved = 1e-8 * np.random.default_rng(0).standard_normal(here.coordinates)
-    after = gaps_of(displaced(here, moved))
-    np.testing.assert_allclose(found.gap - after.gap, closing @ moved, atol=1e-14)
-
-
-def displaced(here, moved):
-    """The configuration with the first coordinates moved."""
-    from faultgouge.analysis.arrays import derive_frozen
-
-    return derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T)
+    after = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
+    np.testing.assert_allclose(found.gap - after.gap, found.rates(here) @ moved, atol=1e-14)
+    moved[:] = 0.9 * here.contacts.overlap.max() * (np.arange(here.coordinates) == 1)  # x of the second
+    apart = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
+    assert apart.gap.max() == pytest.approx(moved.max() + GAP, rel=1e-6)
 
 
 def test_a_push_that_closes_a_gap_is_too_large(row):
     """LAMMPS's second disk stays where it is after half of the largest push, and is hit after twice that push."""
     lmp, here = row
     velocity = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
-    times = np.linspace(0.01, 0.5, 50)
-    motion = one_sided_motion(here, velocity, times=times)
+    motion = one_sided_motion(here, velocity, times=np.linspace(0.01, 0.5, 50))
     most = motion.scales[1]
     # close looks take steps of 0.3 of the stable one
     assert most == pytest.approx(GAP / motion.displacement[:, 0, 0].max(), rel=0.1)
@@ -62,9 +50,8 @@ def test_a_push_that_closes_a_gap_is_too_large(row):
     # dashpots do not count, and the last disk is nearer to the first: two disks share the energy of a gap of GAP / 2
     assert verdict.largest_energy == pytest.approx(0.25 * 300 * (GAP / 2) ** 2, rel=1e-3)
     assert "no contact opens, closes or slides" in str(verdict)
-    rise = stability(here, rise=velocity).rising
-    assert rise["next_event"] == "closes"
-    assert rise["next_change"] == pytest.approx(300 * GAP, rel=1e-3)  # of the spring of the floor
+    rise = stability(here, rise=velocity).rising  # against the spring of the floor
+    assert (rise["next_event"], rise["next_change"]) == ("closes", pytest.approx(300 * GAP, rel=1e-3))
     for size, hit in ((0.5, False), (2.0, True)):
         command(lmp, "velocity all set 0 0 0")
         before = of_particle(lmp, "x", 2)[0]

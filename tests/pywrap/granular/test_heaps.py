@@ -6,10 +6,11 @@ apart. Its torque R n x f has a spring and a dashpot of the relative rotation, a
 
 import numpy as np
 import pytest
-from granular_packings import command
+from granular_packings import agree, command, deck, is_proved
 from pushes import in_steps, pushed
 
-from faultgouge.analysis import damping_matrix, stability, stable_timestep, stiffness_matrix
+import faultgouge
+from faultgouge.analysis import stability, stable_timestep
 from faultgouge.analysis.motion.pushes import random_pushes
 
 DAMPED, UNDAMPED = ("0.6", "1e-3", "coeff_restitution limit_damping"), ("1e-12", "0.0", "velocity")
@@ -19,38 +20,23 @@ MODEL = "hertz/material 1e7 {} 0.3 tangential {law} NULL 1.0 0.5 rolling sds 2e2
 @pytest.fixture
 def heap(lammps_with):
     """Makes a heap at rest: tangential law, bound of rolling friction, whether there are dashpots, and the seed."""
-    from faultgouge.pywrap import relax
 
     def make(law: str, mu: float, damped: bool, seed: int, count: int):
         model, wall = (MODEL.format(*each, law=law, mu=mu) for each in (DAMPED, DAMPED if damped else UNDAMPED))
-        lmp = lammps_with(f"""
-units si
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -0.03 0.03 -0.03 0.03 -0.001 0.06 units box
-create_box 1 box
-region tube cylinder z 0 0 0.008 0.0025 0.05 units box
-create_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000
-set group all diameter 0.004 density 2500
-pair_style granular
-pair_coeff * * {model}
-region side cylinder z 0 0 0.012 -0.001 0.06 units box side in
-fix floor all wall/gran granular {wall} zplane 0.0 NULL contacts
-fix side all wall/gran/region granular {model} region side
-fix load all gravity 9.81 vector 0 0 -1
-fix move all nve/sphere
-timestep 1e-5
-thermo_modify lost ignore
-run 15000 post no
-unfix side
-run 20000 post no
-""")
-        relax(lmp)
+        tube = "region tube cylinder z 0 0 0.008 0.0025 0.05 units box"
+        side = "region side cylinder z 0 0 0.012 -0.001 0.06 units box side in"
+        walls = f"pair_coeff * * {model}\n{side}\nfix side all wall/gran/region granular {model} region side"
+        lmp = lammps_with(deck(
+            [], f"granular {wall}", "zplane 0 NULL contacts", box="block -0.03 0.03 -0.03 0.03 -0.001 0.06", load="",
+            fill=f"{tube}\ncreate_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000", units="si",
+            diameters=(0.004,), density="density 2500", timestep=1e-5,
+            more=f"{walls}\nfix load all gravity 9.81 vector 0 0 -1\nfix move all nve/sphere",
+            run="run 15000 post no\nunfix side\nrun 20000 post no",
+        ))  # fmt: skip
+        faultgouge.relax(lmp)
         if not damped:
-            command(lmp, f"pair_coeff * * {wall}")
-            relax(lmp)
+            lmp.command(f"pair_coeff * * {wall}")
+            faultgouge.relax(lmp)
         return lmp
 
     return make
@@ -67,18 +53,13 @@ HEAPS = {
 @pytest.mark.parametrize("which", HEAPS)
 def test_a_heap_after_pushes(heap, which):
     """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""
-    from faultgouge.pywrap import from_lammps
-
     lmp = heap(*HEAPS[which])
-    here = from_lammps(lmp)
-    assert here.operators == "laws"
-    assert here.proof < 1e-4
+    here = faultgouge.from_lammps(lmp)
+    is_proved(here, "laws", 1e-4)
     assert here.contacts.couple.sum() == len(here.contacts.touching)
-    told = stability(here)
-    assert told.stable is (which != "grows")
-    assert (told.rolling_at_bound > 0) is (which == "rolls at the bound")
-    assert told.at_bound == 0
-    assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is (which == "rolls at the bound")
+    told, rolls = stability(here), which == "rolls at the bound"
+    assert (told.stable, told.at_bound, told.rolling_at_bound > 0) == (which != "grows", 0, rolls)
+    assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is rolls
     times, size = ([0.05, 0.1, 0.2, 0.4], 1e-10) if which == "grows" else ([0.02, 0.05, 0.1, 0.2], 1e-8)
     push = random_pushes(here, 1)
     timestep = 0.1 * float(stable_timestep(here))
@@ -90,29 +71,24 @@ def test_a_heap_after_pushes(heap, which):
 
 def test_k_and_c_are_those_of_forces(heap):
     """K and C by laws beside differences of LAMMPS's forces, which know nothing of rolling."""
-    from faultgouge.pywrap import from_lammps
-
     lmp = heap("mindlin/force", 0.1, True, 1, 15)
-    laws, differences = (from_lammps(lmp, differences=each) for each in (False, True))
+    laws, differences = (faultgouge.from_lammps(lmp, differences=each) for each in (False, True))
     assert len(laws.contact_columns()["mobilised"]) == len(differences.contacts) + laws.contacts.touching.wall.sum()
     assert not len(differences.one_sided_particles)
-    for matrix in (stiffness_matrix, damping_matrix):
-        one, other = matrix(laws), matrix(differences)
-        assert abs(one - other).max() < 1e-6 * abs(other).max()
+    agree(laws, differences, 1e-6)
 
 
 @pytest.mark.parametrize("mu", [0.5, 0.0])
 def test_the_law_of_two_spheres_and_a_wall(two, tmp_path, mu):
     """`rolling sds` has a stiffness, a dashpot and a bound that no overlap, radius or mass changes; a file keeps it."""
     from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
-    from faultgouge.pywrap import from_lammps
 
     law = f"hertz 1e5 1 tangential mindlin 3e4 1.0 {mu} rolling sds 7e2 0.3 0.02"
     wall = f"fix w all wall/gran granular {law} zplane 0 NULL"
     lmp, told = two("granular", f"* * {law}", f"{wall}\nfix move all nve/sphere")
     lmp.numpy.extract_atom("omega")[:] = [0.2, 0.1, 0.0]
     command(lmp, "timestep 1e-6\nrun 3 post no")
-    found = from_lammps(lmp, told, balance=np.inf, prove=False)
+    found = faultgouge.from_lammps(lmp, told, balance=np.inf, prove=False)
     touching, rolls = found.contacts.touching, found.contacts.chosen(found.contacts.couple)
     assert len(touching) == len(rolls) == 2
     for name in ("i", "j", "normal", "overlap", "normal_force", "normal_stiffness"):

@@ -4,7 +4,11 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, instance, start, with_law
+from granular_packings import command, deck, is_proved, on_slope, refused
+
+import faultgouge
+from faultgouge.analysis import stiffness_matrix
+from faultgouge.pywrap import in_a_copy
 
 TRAPS = """
 variable trap atom -0.2*(x-1.5)
@@ -14,28 +18,11 @@ region everywhere block INF INF INF INF INF INF
 HERTZ = "gran/hertz/history 3e3 NULL 40 40 0.5 1"
 
 
-def at_rest(log, d: int, mu: str):
-    """Particles at rest on a slope, with their log."""
-    lmp = instance(log)
-    start(lmp, d, 20 if d == 3 else 18)
-    with_law(lmp, "gran/hertz/history", d, "40", "40", ("", ""), mu)
-    command(lmp, TRAPS)
-    command(lmp, f"""
-fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-thermo 100000
-run 60000
-""")  # fmt: skip
-    return lmp
-
-
 @pytest.fixture(scope="module")
-def bed(tmp_path_factory):
-    """Spheres."""
+def spheres(tmp_path_factory):
     log = tmp_path_factory.mktemp("log") / "log.lammps"
-    lmp = at_rest(log, 3, "0.5")
+    lmp = on_slope(log, "gran/hertz/history", 3, 0.1, mu="0.5", run=60000)
+    command(lmp, TRAPS)
     yield lmp, log
     lmp.close()
 
@@ -43,22 +30,18 @@ def bed(tmp_path_factory):
 @pytest.fixture(scope="module")
 def sliding(tmp_path_factory):
     """Disks, some of their contacts at Coulomb's bound."""
-    lmp = at_rest(tmp_path_factory.mktemp("log") / "log.lammps", 2, "0.3")
+    lmp = on_slope(tmp_path_factory.mktemp("log") / "log.lammps", "gran/hertz/history", 2, 0.05, mu="0.3", run=60000)
     yield lmp
     lmp.close()
 
 
 def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
     """A look in a copy of the process, which has a log of its own, some lines more, and has run before."""
-    from faultgouge.pywrap import from_lammps
-    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 
     def work():
         shutil.copyfile(log, f"{log}.copy")
-        lmp.command(f'log "{log}.copy" append')
-        command(lmp, lines)
-        lmp.command(f"run {run} post no")
-        return from_lammps(lmp, prove=prove)
+        command(lmp, f'log "{log}.copy" append\n{lines}\nrun {run} post no')
+        return faultgouge.from_lammps(lmp, prove=prove)
 
     return in_a_copy(work)
 
@@ -84,96 +67,70 @@ OFTEN = ("momentum", "temp", "addtorque", "oneway", "propel")
 @pytest.mark.parametrize(
     "fix", [each if each.startswith(OFTEN) else pytest.param(each, marks=pytest.mark.long) for each in FIXES]
 )
-def test_fixes_that_act_as_contacts_do_not_tell(bed, fix):
-    from faultgouge.pywrap import NotTakenError
-
+def test_fixes_that_act_as_contacts_do_not_tell(spheres, fix):
     says = f"fix trap {fix.split()[0]} {FIXES[fix]}"
     says = f"^LAMMPS's forces do not change as K says: .*{says}" if FIXES[fix] == ACTS else f"^{says}"
-    with pytest.raises(NotTakenError, match=says) as refusal:
-        look(*bed, f"fix trap all {fix}", 10000)
+    with refused(says) as refusal:
+        look(*spheres, f"fix trap all {fix}", 10000)
     assert "\n" not in str(refusal.value)
 
 
-def test_a_load_that_follows_the_time(bed):
+def test_a_load_that_follows_the_time(spheres):
     """A gravity that rises by a millionth a step is no force by positions."""
-    from faultgouge.pywrap import NotTakenError
-
-    rises = (
-        "variable now equal step\nvariable rise equal 1+1e-6*(step-${now})\nfix load all gravity v_rise vector 0.1 0 -1"
-    )
-    with pytest.raises(NotTakenError, match=r"^LAMMPS's forces change with the time, though nothing moves: a load, "):
-        look(*bed, rises)
-
-
-def test_a_weak_spring_between_particles(bed):
-    """A spring of 0.5 beside contacts of 300: laws of contacts nearly agree, and a common displacement says nothing."""
-    spring = "group one id 1\ngroup other id 9\nfix trap one spring couple other 0.5 0.5 0.5 0.5 0.2"
-    found = look(*bed, spring, 30000)
-    assert found.operators == "differences"
-    assert found.proof < 1e-5
+    rises = "variable now equal step\nvariable rise equal 1+1e-6*(step-${now})"
+    with refused(r"^LAMMPS's forces change with the time, though nothing moves: a load, "):
+        look(*spheres, f"{rises}\nfix load all gravity v_rise vector 0.1 0 -1")
 
 
 @pytest.mark.parametrize(
-    "fix",
-    ["accelerate/cos 0.02", "drag 1.5 1.5 NULL 0.05 0.1", "spring/self 0.1",
-     pytest.param("aveforce NULL 0 NULL", marks=pytest.mark.long)],  # test_lids has lids
+    ("fix", "run"),
+    [("all accelerate/cos 0.02", 10000), ("all drag 1.5 1.5 NULL 0.05 0.1", 10000), ("all spring/self 0.1", 10000),
+     # beside contacts of 300: laws of contacts nearly agree, and a common displacement says nothing
+     ("one spring couple other 0.5 0.5 0.5 0.5 0.2", 30000),
+     pytest.param("all aveforce NULL 0 NULL", 10000, marks=pytest.mark.long)],  # test_lids has lids
 )  # fmt: skip
-def test_forces_of_places_are_taken_by_differences(bed, fix):
+def test_forces_of_places_are_taken_by_differences(spheres, fix, run):
     """The laws of contacts do not have them, which the proof shows; K by differences does, and has a proof."""
-    found = look(*bed, f"fix trap all {fix}", 10000)
-    assert found.operators == "differences"
-    assert found.proof < 1e-5
-    assert found.operator_error < 1e-5
+    is_proved(look(*spheres, f"group one id 1\ngroup other id 9\nfix trap {fix}", run), "differences")
 
 
-def test_a_force_of_places_is_in_the_operator(bed):
+def test_a_force_of_places_is_in_the_operator(spheres):
     """F = -0.2 (x - 1.5) adds 0.2 to each x of K."""
-    from faultgouge.analysis import stiffness_matrix
-
-    found, laws = (look(*bed, "fix trap all addforce v_trap 0 0", 10000, prove=prove) for prove in (True, False))
-    assert (found.operators, laws.operators) == ("differences", "laws")
-    assert found.proof < 1e-5
-    assert found.operator_error < 1e-5
+    found, laws = (look(*spheres, "fix trap all addforce v_trap 0 0", 10000, prove=prove) for prove in (True, False))
+    assert laws.operators == "laws"
+    is_proved(found, "differences")
     added = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray()
     expected = np.diag(np.repeat([0.2, 0.0], [len(found), 5 * len(found)]))
     assert added == pytest.approx(expected, abs=1e-5 * laws.contacts.normal_stiffness.max())
     assert added.diagonal()[: len(found)] == pytest.approx(0.2, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    "fix",
-    [
-        "addforce 0.01 0 0",
-        "addforce v_later 0 0",
-        "damping/cundall 0.3 0.3",
-        "indent 1.0 sphere 0 0 100 1",
-        "setforce NULL NULL NULL",
-        "ave/time 1 1 1 c_thermo_temp",
-    ],
-)
-def test_fixes_without_effect_on_small_motion(bed, fix):
+WITHOUT_EFFECT = [
+    "addforce 0.01 0 0", "addforce v_later 0 0", "damping/cundall 0.3 0.3", "indent 1.0 sphere 0 0 100 1",
+    "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("fix", WITHOUT_EFFECT)
+def test_fixes_without_effect_on_small_motion(spheres, fix):
     """Whatever their names are, the proof takes them."""
-    found = look(*bed, f"fix trap all {fix}", 10000)
-    assert found.operators == "laws"
-    assert found.proof < 1e-5
+    is_proved(look(*spheres, f"fix trap all {fix}", 10000), "laws")
 
 
 def test_proof_is_kept(sliding, tmp_path):
     """The proof is in the file and in what is printed, and no part of the comparison of two packings."""
     from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
-    from faultgouge.pywrap import from_lammps
 
-    found, other = from_lammps(sliding, [f"pair_style {STYLE}", *REST[:3]]), from_lammps(sliding, prove=False)
+    told = [f"pair_style {STYLE}", *REST[:3]]
+    found, other = faultgouge.from_lammps(sliding, told), faultgouge.from_lammps(sliding, prove=False)
+    assert found == other
     assert found.contacts.at_bound.any()
     assert found.proof < 1e-5
-    assert f"proof {found.proof:.1g}>" in repr(found)
     assert other.proof is None
-    assert "not proved>" in repr(other)
-    assert found == other
-    for each in (found, other):
-        write_configuration(tmp_path / "run.h5", each)
-        assert read_configuration(tmp_path / "run.h5").proof == each.proof
-        (tmp_path / "run.h5").unlink()
+    for name, each, says in (("one.h5", found, f"proof {found.proof:.1g}>"), ("two.h5", other, "not proved>")):
+        assert says in repr(each)
+        write_configuration(tmp_path / name, each)
+        assert read_configuration(tmp_path / name).proof == each.proof
 
 
 STYLE = HERTZ.replace("0.5", "0.3")
@@ -192,46 +149,24 @@ RUNS = [
 def test_commands_of_another_run(sliding, change, says):
     """The same normal forces, but other tangential stiffnesses, dashpots or friction; and two constant forces, which
     are not accused."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 
     def work():
         command(sliding, "\n".join(REST[3:]))
-        return from_lammps(sliding, [f"pair_style {STYLE.replace(*change)}", *REST])
+        return faultgouge.from_lammps(sliding, [f"pair_style {STYLE.replace(*change)}", *REST])
 
-    with pytest.raises(NotTakenError, match=says) as refusal:
+    with refused(says) as refusal:
         in_a_copy(work)
     assert "addforce" not in str(refusal.value)
 
 
-def test_a_log_that_lacks_commands(tmp_path):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    lmp = instance(tmp_path / "log.lammps")
-    start(lmp, 3, 20)
-    command(lmp, f"""
-pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1
-pair_coeff * *
-echo none
-pair_style {HERTZ}
-echo both
-fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0.1 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-run 60000
-""")  # fmt: skip
-    with pytest.raises(NotTakenError, match=r"as K says: .*some are not in the log"):
-        from_lammps(lmp)
-    lmp.close()
+def test_a_log_that_lacks_commands(spheres):
+    hidden = f"echo none\npair_style {HERTZ.replace('NULL', '2e3')}\npair_coeff * *\necho both"
+    with refused(r"as K says: .*some are not in the log"):
+        look(*spheres, hidden, 60000)
 
 
 def test_bonds(lammps_with):
     """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
-    from faultgouge.analysis import stiffness_matrix
-    from faultgouge.pywrap import from_lammps
-
     bonded = """fix move all nve/sphere
 fix drag all viscous 1.5
 bond_style harmonic
@@ -245,18 +180,15 @@ run 60000"""
     spheres = spheres.replace("atom_style sphere", "atom_style hybrid sphere bond\natom_modify map array")
     more = "1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4"
     lmp = lammps_with(spheres.replace("create_box 1 box", f"create_box {more}"))
-    found = from_lammps(lmp)
-    assert found.operators == "differences"
-    assert found.proof < 1e-5
-    with_bond = stiffness_matrix(found)
+    found = faultgouge.from_lammps(lmp)
+    is_proved(found, "differences")
     lmp.command("delete_bonds all bond 1 remove")
-    without = from_lammps(lmp, balance=np.inf, differences=True)
+    without = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
     # E = 50 (r - 0.99)^2
     branch = found.position[1] - found.position[0]
     r = np.linalg.norm(branch)
     along = np.outer(branch, branch) / r**2
     expected = 100 * along + 100 * (r - 0.99) / r * (np.eye(3) - along)
-    added = (with_bond - stiffness_matrix(without)).toarray()
-    first, second = len(found) * np.arange(3), len(found) * np.arange(3) + 1
-    for rows, columns, sign in ((first, first, 1), (first, second, -1), (second, second, 1)):
-        assert added[np.ix_(rows, columns)] == pytest.approx(sign * expected, abs=1e-2)
+    added = (stiffness_matrix(found) - stiffness_matrix(without)).toarray()[:12, :12].reshape(3, 4, 3, 4)
+    for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 1, 1)):
+        assert added[:, i, :, j] == pytest.approx(sign * expected, abs=1e-2)

@@ -11,28 +11,28 @@ import pytest
 from granular_packings import command, instance, start, state, with_law
 from reference_layer import on_ranks
 
+import faultgouge
+
+
+def sliding(log, count: int, slope: float, law: str, timestep: float, more: str):
+    """LAMMPS with spheres that collide and slide."""
+    lmp = instance(log)
+    start(lmp, 3, count)
+    with_law(lmp, law, 3, "100", "100", ("", ""))
+    command(lmp, f"fix load all gravity 1.0 vector {slope} 0 -1\nfix move all nve/sphere\ntimestep {timestep}\n{more}")
+    return lmp
+
 
 def test_a_look_changes_nothing(tmp_path):
     """The run that follows is the same to the bit, while particles still collide and slide."""
-    from faultgouge.pywrap import from_lammps
-
     ends = []
     for looks in (0, 2):
-        lmp = instance(tmp_path / f"log{looks}")
-        start(lmp, 3, 12)
-        with_law(lmp, "mindlin_rescale/force", 3, "100", "100", ("", ""))
-        command(lmp, f"""
-fix load all gravity 1.0 vector 0.8 0 -1
-fix move all nve/sphere
-timestep 0.004
-dump 1 all custom 100 {tmp_path}/dump{looks} id x
-fix mean all ave/time 10 1 10 c_thermo_temp file {tmp_path}/mean{looks}
-run 1950
-""")  # fmt: skip
+        dump = f"dump 1 all custom 100 {tmp_path}/dump{looks} id x"
+        mean = f"fix mean all ave/time 10 1 10 c_thermo_temp file {tmp_path}/mean{looks}"
+        lmp = sliding(tmp_path / f"log{looks}", 12, 0.8, "mindlin_rescale/force", 0.004, f"{dump}\n{mean}\nrun 1950")
         before = state(lmp)
         for _ in range(looks):
-            found = from_lammps(lmp, balance=np.inf)
-            assert found.contacts.at_bound.any()
+            assert faultgouge.from_lammps(lmp, balance=np.inf).contacts.at_bound.any()
         assert np.array_equal(state(lmp), before)
         lmp.command("run 500")
         ends.append(state(lmp))
@@ -44,32 +44,21 @@ run 1950
     assert one == other
 
 
-@pytest.mark.parametrize("style", ["custom/gz", "xyz/gz"])
-def test_a_look_leaves_compressed_dumps_whole(tmp_path, style):
+@pytest.mark.parametrize(("style", "columns"), [("custom/gz", "id x y z vx vy vz fx fy fz"), ("xyz/gz", "")])
+def test_a_look_leaves_compressed_dumps_whole(tmp_path, style, columns):
     """zlib writes the rest of a file when it is closed, as a copy of the process would at the place that both share."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp = instance(tmp_path / "log.lammps")
-    start(lmp, 3, 18)
-    with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
-    columns = " id x y z vx vy vz fx fy fz" if style == "custom/gz" else ""
-    command(lmp, f"""
-fix load all gravity 1.0 vector 0.2 0 -1
-fix move all nve/sphere
-timestep 0.002
-dump 1 all {style} 10 {tmp_path}/dump.gz{columns}
-run 1995
-""")  # fmt: skip
+    dump = f"dump 1 all {style} 10 {tmp_path}/dump.gz {columns}\nrun 1995"
+    lmp = sliding(tmp_path / "log.lammps", 18, 0.2, "gran/hertz/history", 0.002, dump)
     own = (tmp_path / "own.txt").open("w")
     own.write("what a user's script has written")
     for _ in range(2):
-        from_lammps(lmp, balance=np.inf)
+        faultgouge.from_lammps(lmp, balance=np.inf)
         lmp.command("run 1000")
     lmp.close()
     own.close()
     text = gzip.decompress((tmp_path / "dump.gz").read_bytes()).decode()
     assert len(re.findall(r"(?m)^(ITEM: TIMESTEP$| ?Atoms\. Timestep)", text)) == 400
-    assert text.count("\n") == 400 * (18 + (2 if style == "xyz/gz" else 9))
+    assert text.count("\n") == 400 * (18 + (9 if columns else 2))
     assert (tmp_path / "own.txt").read_text() == "what a user's script has written"
 
 

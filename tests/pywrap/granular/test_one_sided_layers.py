@@ -19,12 +19,8 @@ def layer():
     from research.modes.loss import with_dashpots
 
     found = []
-    scene = Scene.from_mapping(
-        {
-            "packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0},
-            "ramp": {"step": 3e-3, "until": 0.6}, "modes": {"fx_over_fy": [0.2]},
-        }
-    )  # fmt: skip
+    parts = {"packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0}}
+    scene = Scene.from_mapping(parts | {"ramp": {"step": 3e-3, "until": 0.6}, "modes": {"fx_over_fy": [0.2]}})
     start = settle(scene)
     at_loads(scene, replace(start, packing=as_slider(start.packing)), lambda packing: found.append(packing) or {})
     return with_dashpots(found[0], 171.0)
@@ -48,6 +44,14 @@ def pushed_layer(packing, push, times, size=PUSH):
     return np.array(found)
 
 
+def compared(packing, push, times, agrees):
+    """D over the push squared as the plugin has it, where one-sided motion has the same; and the one-sided motion."""
+    (velocity,), found = velocities(packing.configuration, push), pushed_layer(packing, push[:, 0], times)
+    expected = one_sided_motion(packing, velocity, times=times)
+    np.testing.assert_allclose(found, expected.mean_square_displacement, rtol=agrees)
+    return found, expected
+
+
 def test_the_standard_law_after_a_push(layer):
     """Dashpots of the plugin feel the velocity of the full step, and those of one-sided motion that of the half step:
     1 % of D."""
@@ -56,11 +60,9 @@ def test_the_standard_law_after_a_push(layer):
     assert len(layer.contacts) - here.contacts.one_sided.sum() > 100
     push = random_pushes(here, 1)
     push.reshape(here.axes, len(here), -1)[:, layer.rattlers] = 0.0  # the runs of this package hold rattlers
-    times = np.array([0.2, 0.5, 1.0, 2.0])
-    for column, velocity in zip(push.T, velocities(here, push), strict=True):
-        expected = one_sided_motion(layer, velocity, times=times)
+    for column in push.T:
+        _, expected = compared(layer, column[:, None], np.array([0.2, 0.5, 1.0, 2.0]), 0.02)
         assert np.any(expected.slid[-1] > 0)
-        np.testing.assert_allclose(pushed_layer(layer, column, times), expected.mean_square_displacement, rtol=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +70,13 @@ def far_from_the_bound():
     """Thirty disks with Coulomb's slider at 0.02 F_y, whose contacts all stick, and dashpots or none."""
     from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 
-    width = {"disks": 30, "seed": 4, "top": 3, "width": 3.57}
-    law = {"kn": 2e5, "mu": 2.0, "history": "coulomb"}
+    parts = {"packing": {"disks": 30, "seed": 4, "top": 3, "width": 3.57}, "load": {"fy": 3.0}}
+    parts["law"] = {"kn": 2e5, "mu": 2.0, "history": "coulomb"}
 
     @cache
     def make(cn):
         damping = {"damping": {"cn": cn, "ct": 2 / 7 * cn}} if cn else {}
-        state = settle(Scene.from_mapping({"packing": width, "law": law, "load": {"fy": 3.0}, **damping}))
+        state = settle(Scene.from_mapping(parts | damping))
         with Engine(state.packing) as engine:
             for step in range(1, 16):
                 state = equilibrate(engine, state, fx=4e-3 * step)
@@ -89,10 +91,7 @@ def test_vibration_carries_particles_on_whose_contacts_wear_down(far_from_the_bo
     packing = far_from_the_bound(0.0)
     here, verdict = packing.configuration, stability(packing)
     assert str(verdict).startswith("stable but for creep: no motion grows exponentially\n")
-    push, times = random_pushes(here, 1)[:, :1], np.array([4.0, 12.0])
-    found = pushed_layer(packing, push[:, 0], times)
-    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
-    np.testing.assert_allclose(found, expected, rtol=0.02)
+    found, _ = compared(packing, random_pushes(here, 1)[:, :1], np.array([4.0, 12.0]), 0.02)
     assert np.sqrt(found[-1]) / 12 == pytest.approx(verdict.creep.velocity, rel=0.3)
 
 
@@ -101,14 +100,10 @@ def test_with_loss_particles_stay_displaced(far_from_the_bound):
     """Every linear motion decays, and D rises."""
     packing = far_from_the_bound(20.0)
     here, verdict = packing.configuration, stability(packing)
-    assert verdict.stable
-    assert verdict.growth_rate < 0
+    assert verdict.stable is (verdict.growth_rate < 0) is True
     assert "they stay displaced, by D up to" in str(verdict)
-    push, times = random_pushes(here, 1)[:, :1], np.array([1.0, 10.0])
-    found = pushed_layer(packing, push[:, 0], times)
+    found, _ = compared(packing, random_pushes(here, 1)[:, :1], np.array([1.0, 10.0]), 0.03)
     assert found[1] > 2 * found[0]
-    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
-    np.testing.assert_allclose(found, expected, rtol=0.03)
     assert stability(packing, time=10.0).creep.amplification == pytest.approx(found[1], rel=0.5)
 
 
@@ -132,19 +127,11 @@ def test_a_longer_run_knows_no_less():
     """Sliders at rest slide again where vibration wears contacts down; the packing rests all the same."""
     from faultgouge.pywrap import Scene, ramp
 
-    scene = Scene.from_mapping(
-        {
-            "packing": {"seed": 2, "disks": 40, "width": 7.7},
-            "law": {"kn": 2e5, "mu": 0.5, "history": "coulomb"},
-            "load": {"fy": 3.0},
-            "ramp": {"step": 0.05, "until": 0.6},
-            "damping": {"cn": 60.0, "ct": 17.0},
-        }
-    )
-    *_, last = ramp(scene)
+    parts = {"packing": {"seed": 2, "disks": 40, "width": 7.7}, "law": {"kn": 2e5, "mu": 0.5, "history": "coulomb"}}
+    more = {"load": {"fy": 3.0}, "ramp": {"step": 0.05, "until": 0.6}, "damping": {"cn": 60.0, "ct": 17.0}}
+    *_, last = ramp(Scene.from_mapping(parts | more))
     short, longer = stability(last.packing), stability(last.packing, time=20.0)
-    assert short.one_sided.slip_left == 0
-    assert short.one_sided.time < 10
+    assert (short.one_sided.slip_left, short.one_sided.time < 10) == (0, True)
     assert short.stable is longer.stable is True
     assert longer.one_sided.amplification > 1.5 * short.one_sided.amplification
     assert "contacts may slide again, and D may rise further" in str(short)
@@ -161,8 +148,7 @@ def test_the_standard_law_under_a_load_that_rises(layer):
         return drift_and_vibration(parts, windows.length, rate)
 
     told = stability(layer, rise="fx")
-    assert told.stable is True
-    assert told.rising.steady
+    assert told.stable is told.rising.steady is True
     assert told.rising.vibration > 0.05 * told.rising.drift
     for rate in (1e-5, 1e-6):
         found = in_lammps(layer, rate, told.rising)

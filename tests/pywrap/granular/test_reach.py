@@ -14,18 +14,7 @@ from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.motion.reach import OVERLAP_CHANGE, reach_of
 
 BEDS = [("mindlin/force", 2), ("gran/hertz/history", 3)]
-
-
-@pytest.fixture(scope="module")
-def bed(beds):
-    """LAMMPS with particles at rest, none of whose contacts is at the bound, and their configuration."""
-    from faultgouge.pywrap import from_lammps
-
-    def make(law, d):
-        lmp = beds(law, d)
-        return lmp, from_lammps(lmp)
-
-    return make
+VECTORS = ("normal", "tangential_force", "closing", "parting")
 
 
 def renumbered(here, random):
@@ -37,27 +26,22 @@ def renumbered(here, random):
     values["i"], values["j"] = place[c.i], np.where(c.wall, -1, place[c.j])
     swap = ~c.wall & (random.random(len(c)) < 0.5)
     values["i"][swap], values["j"][swap] = values["j"][swap], values["i"][swap]
-    for name in ("normal", "tangential_force", "closing", "parting"):
+    for name in VECTORS:
         values[name][swap] *= -1
     for name in ("slip_arm", "lever_arm"):
         values[name][swap] = values[name][swap][:, ::-1]
-    given = {
-        name: getattr(here, name)[order] for name in ("position", "radius", "mass", "inertia", "load", "free", "kind")
-    }
+    names = ("position", "radius", "mass", "inertia", "load", "free", "kind")
+    given = {name: getattr(here, name)[order] for name in names}
     return derive_frozen(here, contacts=LinearisedContacts(**values), **given)
 
 
 def turned(here, matrix):
     """The packing rotated or mirrored: vectors turn, and torques as pseudovectors."""
-    c, d = here.contacts, here.dimension
-    values = {name: getattr(c, name) for name in PER_CONTACT}
-    values |= {name: values[name] @ matrix.T for name in ("normal", "tangential_force", "closing", "parting")}
-    load = here.load @ matrix.T
+    c, d, load = here.contacts, here.dimension, here.load @ matrix.T
     load[:, 1] *= np.linalg.det(matrix)
-    return derive_frozen(
-        here, contacts=LinearisedContacts(**values), load=load, box=here.box @ matrix.T,
-        position=here.position @ matrix[:d, :d].T,
-    )  # fmt: skip
+    contacts = derive_frozen(c, **{name: getattr(c, name) @ matrix.T for name in VECTORS})
+    position = here.position @ matrix[:d, :d].T
+    return derive_frozen(here, contacts=contacts, load=load, box=here.box @ matrix.T, position=position)
 
 
 @pytest.mark.parametrize(("law", "d"), BEDS)
@@ -67,9 +51,8 @@ def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
     told = stability(here)
     assert told.largest_energy == pytest.approx(expected.energy, rel=1e-9)
     others = [renumbered(here, random) for _ in range(20)]
-    angle = 0.7
-    rotation = np.eye(3)
-    rotation[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    cos, sin = np.cos(0.7), np.sin(0.7)
+    rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     others += [turned(here, rotation), turned(here, np.diag([-1.0, 1.0, 1.0]))]
     for other in others:
         found = reach_of(OneSidedSystem.of(other))
@@ -126,16 +109,9 @@ def test_the_push_that_the_bound_is_made_for_takes_a_contact_there(bed, law, d):
 def test_free_motions_limit_the_time(bed):
     """Without friction disks turn freely; the range then holds up to a time that is told."""
     _, here = bed("mindlin/force", 2)
-    c = here.contacts
-    smooth = derive_frozen(
-        here,
-        contacts=derive_frozen(
-            c,
-            tangential_stiffness=np.where(c.wall, 0.0, c.tangential_stiffness),
-            tangential_force=0 * c.tangential_force,
-        ),
-    )
-    found = reach_of(OneSidedSystem.of(smooth), free=1)
+    c, none = here.contacts, 0 * here.contacts.tangential_force
+    smooth = derive_frozen(c, tangential_stiffness=c.tangential_stiffness * ~c.wall, tangential_force=none)
+    found = reach_of(OneSidedSystem.of(derive_frozen(here, contacts=smooth)), free=1)
     assert found is not None
     assert 0 < found.time < np.inf
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pushes import in_a_quiet_copy, places
 
 from faultgouge.analysis import stability
 from faultgouge.analysis.arrays import derive_frozen
@@ -12,43 +13,28 @@ TILT = 1e-6
 STEP = 2e-3
 
 
-@pytest.fixture(scope="module")
-def bed(beds):
+@pytest.fixture
+def slope(bed):
     """Disks at rest without a contact at Coulomb's bound, and the direction of a slope that rises."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp = beds("mindlin/force", 2)
-    here = from_lammps(lmp)
+    lmp, here = bed("mindlin/force", 2)
     return lmp, here, np.outer(here.mass, [1.0, 0.0])
 
 
 def displaced(lmp, here, rise, time=40.0):
     """Root mean square displacement, length, of LAMMPS's particles by a tilt and by a load that rises by so much."""
-    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
-    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
 
     def follow():
-        lmp.command("log none")
-        quieten(lmp, drag=True)
-        set_velocity(lmp, here, np.zeros(here.coordinates))
-        before = owned_array(lmp, "x")[rows_of(lmp, here)].copy()
-        for line in (
-            f"timestep {STEP}",
-            "reset_timestep 0",
-            f"variable force atom mass*({TILT}+{rise / time}*step*dt)",
-            "fix rise all addforce v_force 0 0",
-            f"run {round(time / STEP)} post no",
-        ):
-            lmp.command(line)
-        moved = owned_array(lmp, "x")[rows_of(lmp, here)] - before
-        return float(np.sqrt(np.mean(moved[:, :2] ** 2)))
+        before = places(lmp, here)
+        lmp.command(f"run {round(time / STEP)} post no")
+        return float(np.sqrt(np.mean((places(lmp, here) - before)[:, :2] ** 2)))
 
-    return in_a_copy(follow)
+    force = f"variable force atom mass*({TILT}+{rise / time}*step*dt)\nfix rise all addforce v_force 0 0"
+    return in_a_quiet_copy(lmp, follow, f"velocity all set 0 0 0\ntimestep {STEP}\nreset_timestep 0\n{force}")
 
 
-def test_a_load_counts_from_the_rise_that_is_said(bed):
+def test_a_load_counts_from_the_rise_that_is_said(slope):
     """The tilt moves the particles as far as a rise of the same size, and twice as far before dashpots have acted."""
-    lmp, here, direction = bed
+    lmp, here, direction = slope
     load = here.load.copy()
     load[:, 0, :2] += TILT * direction
     found = stability(derive_frozen(here, load=load), rise=direction)
@@ -60,8 +46,8 @@ def test_a_load_counts_from_the_rise_that_is_said(bed):
     assert displaced(lmp, here, 0.1 * least) > 1.4 * 0.1 * least * drift
 
 
-def test_a_load_on_what_nothing_touches_is_not_followed(bed):
-    _, here, direction = bed
+def test_a_load_on_what_nothing_touches_is_not_followed(slope):
+    _, here, direction = slope
     touched = np.arange(len(here)) != np.argmax(here.position[:, 1])  # the one on top bears none
     c = here.contacts
     apart = derive_frozen(here, contacts=c.chosen(touched[c.i] & (touched[c.j] | c.wall)))

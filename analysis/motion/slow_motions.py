@@ -1,0 +1,118 @@
+r"""The slowest motions of a large packing, so that a random state need not be followed until they have decayed.
+
+In the state :math:`u = (\omega_0 z, \dot z)` small motion obeys :math:`\dot u = Z u`. The eigenvalues s of Z that are
+next to a small real shift :math:`\sigma` belong to the slowest motions: long waves, and particles with weak contacts.
+Those of :math:`(Z - \sigma)^{-1}` are the largest. A block Krylov space holds them, and one of the transpose holds
+their left vectors. Both need the factors of one real matrix, :math:`P(\sigma) = \sigma^2 + \sigma G + A`.
+
+Let X and Y be bases of the right and of the left vectors. The projection
+
+.. math:: \Pi = 1 - X\, (Y^T X)^{-1}\, Y^T
+
+takes these motions out of a state and leaves all others as they are: a left vector l of another motion has
+:math:`l^H X = 0`. The waves of a box may have nearly equal s: the space of all of them is well known, where single
+vectors are not. The error of s is that of its residual, :math:`|Z x - s x| / |y^H x|` with unit vectors. Where it is a
+hundredth of :math:`|\mathrm{Re}\, s|` at the most, the l of a motion that does not decay has no more than that in
+common with x. (Saad, *Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 6 to 8.)
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import eig, schur
+from scipy.sparse import csc_array, csr_array, eye_array
+
+from ..arrays import Complexes, Floats
+from ..factors.lanczos import BlockKrylov
+from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+
+KRYLOV = 300
+"""Vectors of a Krylov space: of 8,000 spheres in a box it holds the twelve shear waves and all that is slower."""
+
+
+def slow_motions(
+    a: csr_array, g: csr_array, kept: csr_array, reference: float, drifts: int
+) -> tuple[Complexes, Floats, Callable[[Floats], Floats]] | None:
+    """The slowest motions; None if the Krylov spaces do not hold any to a hundredth of its decay.
+
+    Parameters
+    ----------
+    a, g : scipy.sparse.csr_array, shape (n, n)
+        A, 1 / time^2, and G, 1 / time.
+    kept : scipy.sparse.csr_array, shape (m, n)
+        Orthonormal basis of their coordinates: states are of m coordinates.
+    reference : float
+        omega_0, 1 / time: a tenth of it is the shift.
+    drifts : int
+        Motions that no force opposes.
+
+    Returns
+    -------
+    s : ndarray of complex, shape (k,)
+        Eigenvalues but those of drift, 1 / time.
+    error : ndarray, shape (k,)
+        Of s, 1 / time.
+    leave : callable
+        Takes these motions and drift out of a state u, shape (2m,).
+    """
+    shift, size = 0.1 * reference, a.shape[0]
+    try:
+        factors = symmetric_lu(csc_array(a + shift * g + shift**2 * eye_array(size)))
+    except SingularMatrixError:
+        return None
+
+    def image(states: Floats) -> Floats:
+        z, v = np.split(states, 2)
+        return np.vstack([reference * v, -(a @ z) / reference - g @ v])
+
+    def transposed(states: Floats) -> Floats:
+        z, v = np.split(states, 2)
+        return np.vstack([-(a.T @ v) / reference, reference * z - g.T @ v])
+
+    def inverse(states: Floats) -> Floats:
+        z, v = np.split(states, 2)
+        found = factors.solve(-reference * v - g @ z - shift * z)
+        return np.vstack([found, (z + shift * found) / reference])
+
+    def inverse_transposed(states: Floats) -> Floats:
+        z, v = np.split(states, 2)
+        found = factors.solve(-reference * z - shift * v, "T")
+        return np.vstack([(v + g.T @ found + shift * found) / reference, found])
+
+    spaces = []
+    for operator in (inverse, inverse_transposed):
+        space = BlockKrylov(operator, np.random.default_rng(0).standard_normal((6, 2 * size)), min(KRYLOV, 2 * size))
+        space.extend(space.most)
+        values, vectors = eig(space.square)
+        order = np.argsort(-np.abs(values))
+        sizes = np.abs(values[order])
+        vague = space.residuals(vectors[:, order]) > 1e-6 * sizes
+        spaces.append((space, sizes, int(np.argmax([*vague[:-1], True]))))
+    known = min(each[2] for each in spaces)
+    if known <= 2 * drifts:
+        return None
+    # up to a place where both spaces part the motions from those beyond
+    apart = [
+        k for k in range(2 * drifts + 1, known + 1) if all(sizes[k] < 0.97 * sizes[k - 1] for _, sizes, _ in spaces)
+    ]
+    if not apart:
+        return None
+    count = apart[-1]
+    bases = []
+    for space, sizes, _ in spaces:
+        least = np.sqrt(sizes[count - 1] * sizes[count])
+        _, vectors, inside = schur(space.square, sort=lambda re, im, least=least: np.hypot(re, im) > least)
+        bases.append(space.basis[: space.used].T @ vectors[:, :inside])
+    right, left = bases
+    if right.shape != left.shape:
+        return None
+    left = left @ np.linalg.inv(right.T @ left)  # Y^T X = 1
+    s, y, x = eig(left.T @ image(right), left=True, right=True)
+    order = np.argsort(np.abs(s))[2 * drifts :]
+    s, x, y = s[order], right @ x[:, order], left @ y[:, order]
+    residual = image(x) - s * x
+    error = np.linalg.norm(residual, axis=0) * np.linalg.norm(y, axis=0) / np.abs(np.sum(y.conj() * x, axis=0))
+    if np.any(error > 0.01 * np.abs(s.real)):
+        return None
+    right, left = (np.vstack([kept @ half for half in np.split(each, 2)]) for each in (right, left))
+    return s, error, lambda states: states - right @ (left.T @ states)
