@@ -15,8 +15,8 @@ from faultgouge.analysis import (
     stability,
     stiffness_matrix,
 )
-from faultgouge.analysis.files.contact_tables import material_of, read_contacts, read_spheres, verdict_within_digits
-from faultgouge.analysis.files.formats import write_packing
+from faultgouge.analysis.files.contact_tables import material_of, read_contacts, verdict_within_digits
+from faultgouge.analysis.files.formats import read_particles, write_packing
 from faultgouge.pywrap import from_lammps
 
 LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
@@ -104,7 +104,7 @@ BY_INDEX = ("mercury.fstat", "yade.txt")
 def test_the_verdict_of_a_table_is_the_live_one(live, name, columns):
     folder, packing = live
     write_tables(folder, packing)
-    spheres = read_spheres(folder / "spheres.dump")
+    spheres = read_particles(folder / "spheres.dump")
     if name in BY_INDEX:  # codes that count from 0
         object.__setattr__(spheres, "id", spheres.id - 1)
     found = read_contacts(spheres, folder / name, material_of(LAW), columns)
@@ -138,7 +138,7 @@ def test_digits_that_do_not_tell_are_told(live):
 
     def of(gamma):
         law = material_of(LAW.replace("gamma=100,gamma_t=100", f"gamma={gamma:.17g},gamma_t=0"))
-        return read_contacts(read_spheres(folder / "spheres.dump"), folder / "table.csv", law)
+        return read_contacts(read_particles(folder / "spheres.dump"), folder / "table.csv", law)
 
     def growth(gamma):
         found = of(gamma)
@@ -163,7 +163,7 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, table, old, new, word)
     (tmp_path / "s.csv").write_text(texts["spheres"])
     (tmp_path / "c.csv").write_text(texts["contacts"])
     with pytest.raises(FaultgougeError) as raised:
-        read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(texts["material"]))
+        read_contacts(read_particles(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(texts["material"]))
     assert word in str(raised.value)
     assert "\n" not in str(raised.value)
 
@@ -173,7 +173,7 @@ def test_spheres_come_from_any_format_with_radii(live, tmp_path, suffix):
     """With their box, and the numbers of the packing to the bit."""
     _, packing = live
     write_packing(tmp_path / f"spheres{suffix}", packing)
-    found, order = read_spheres(tmp_path / f"spheres{suffix}"), np.argsort(packing.ids)
+    found, order = read_particles(tmp_path / f"spheres{suffix}"), np.argsort(packing.ids)
     np.testing.assert_array_equal(found.position, packing.position[order])
     np.testing.assert_array_equal(found.radius, packing.radius[order])
     np.testing.assert_allclose(found.mass, packing.mass[order], rtol=1e-15)
@@ -186,7 +186,7 @@ def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path):
     found = []
     for name, head in (("plain", ""), ("told", "# two spheres\n# of a laboratory\n")):
         (tmp_path / f"{name}.csv").write_text(f"{head}x,y,z,radius\n{rows}")
-        found.append(read_spheres(tmp_path / f"{name}.csv"))
+        found.append(read_particles(tmp_path / f"{name}.csv"))
     assert (found[0].position == found[1].position).all()
     (tmp_path / "yade.txt").write_text("#x y z r\n" + rows.replace(",", " "))
-    assert (read_spheres(tmp_path / "yade.txt").position == found[0].position).all()
+    assert (read_particles(tmp_path / "yade.txt").position == found[0].position).all()
