@@ -51,39 +51,30 @@ def write_tables(folder, packing):
     size = np.linalg.norm(c.tangential_force, axis=1)
     along = c.tangential_force / size[:, None]
     zero = np.zeros((len(c), 3))
-    fstat = np.column_stack(
-        [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
+    about = [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
+    fstat = np.column_stack(about)
+    pairs = list(
+        zip(first, second, c.normal_force, c.normal_force[:, None] * c.normal, c.tangential_force, whole, strict=True)
     )
+    head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n{len(c)}\nITEM: BOX BOUNDS pp pp pp\n" + 3 * "0 1\n"
+    head += f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}"
     rows = {
         # MercuryDPM: each contact from both sides, and here with the tangential force of the second
         "mercury.fstat": ["# 0 24", "# info", "# info", *map(six, fstat)],
         # YADE: forces on the second
         "yade.txt": [
             "id1 id2 fnx fny fnz fsx fsy fsz",
-            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, n, t in zip(
-                first, second, c.normal_force[:, None] * c.normal, c.tangential_force, strict=True)),
+            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, _, n, t, _ in pairs),
         ],
         # LIGGGHTS: pos id force, from either side
-        "liggghts.dump": [
-            "ITEM: TIMESTEP", "0", "ITEM: NUMBER OF ENTRIES", str(len(c)), "ITEM: BOX BOUNDS pp pp pp", *3 * ["0 1"],
-            f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}",
-            *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, f in zip(first, second, whole, strict=True)),
-        ],
+        "liggghts.dump": [head, *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, *_, f in pairs)],
         "table.csv": [
             "id1,id2,fn,ftx,fty,ftz",
-            *(f"{a},{b},{six([n, *t]).replace(' ', ',')}" for a, b, n, t in zip(
-                first, second, c.normal_force, c.tangential_force, strict=True)),
+            *(f"{a} {b} {six([f, *t])}".replace(" ", ",") for a, b, f, _, t, _ in pairs),
         ],
-    }  # fmt: skip
+    }
     for name, lines in rows.items():
         (folder / name).write_text("\n".join([*lines, ""]))
-    order = np.argsort(packing.ids)
-    place = np.column_stack([packing.position, packing.radius])[order]
-    edge = packing.box[1, 1]
-    lines = [f"{len(place)} 0 0 0 0 {edge:.17g} {edge:.17g} {edge:.17g}"]
-    (folder / "mercury.data").write_text(
-        "\n".join([*lines, *(f"{six(r[:3])} 0 0 0 {six(r[3:])} {six(np.zeros(7))}" for r in place), ""])
-    )
 
 
 LOCAL = ["index", "id1", "id2", "dist", "fn", "ftx", "fty", "ftz"]
@@ -91,16 +82,10 @@ LIGGGHTS = ["x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "image", "fx", "fy
 BY_INDEX = ("mercury.fstat", "yade.txt")
 
 
-@pytest.mark.parametrize(
-    ("name", "columns"),
-    [
-        ("local.dump", LOCAL),
-        ("table.csv", None),
-        ("liggghts.dump", LIGGGHTS),
-        ("mercury.fstat", None),
-        ("yade.txt", None),
-    ],
-)
+TABLES = {"local.dump": LOCAL, "table.csv": None, "liggghts.dump": LIGGGHTS, "mercury.fstat": None, "yade.txt": None}
+
+
+@pytest.mark.parametrize(("name", "columns"), TABLES.items())
 def test_the_verdict_of_a_table_is_the_live_one(live, name, columns):
     folder, packing = live
     write_tables(folder, packing)

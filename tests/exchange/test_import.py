@@ -115,8 +115,7 @@ def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, m
     disks = {"x": [0.5, 1.6, 2.7], "y": [0.5, 0.5, 0.5], "radius": [0.5] * 3, "top": top, "mass": mass}
     (tmp_path / "packing.json").write_text(json.dumps(disks))
     found = read_disks(tmp_path / "packing.json")
-    assert found.top.tolist() == [False, False, True]
-    assert found.mass.tolist() == np.broadcast_to(mass, 3).tolist()
+    assert (found.top.tolist(), found.mass.tolist()) == ([False, False, True], np.broadcast_to(mass, 3).tolist())
 
 
 def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):
