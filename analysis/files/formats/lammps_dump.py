@@ -100,8 +100,7 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
 
 def _snapshot(path: Path, frame: int | None) -> DumpFrame:
     """A snapshot by its number; by default the last one, if all are of as many particles."""
-    counts = list[int]()
-    kept: deque[DumpFrame] = deque(maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
+    counts, kept = list[int](), deque[DumpFrame](maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
     for shown in dump_frames(path):
         kept.append(shown)
         counts.append(len(shown.rows))
