@@ -26,7 +26,7 @@ LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
 def live(tmp_path_factory):
     """Spheres at rest in LAMMPS, and their dumps with LAMMPS's own six digits."""
     folder = tmp_path_factory.mktemp("tables")
-    lmp = at_rest(3, folder / "log.lammps", count=24)
+    lmp = at_rest(3, folder / "log.lammps", count=16)
     lmp.commands_string(f"""
 compute ids all property/local patom1 patom2
 compute forces all pair/local dist force p1 p2 p3
@@ -60,7 +60,7 @@ def write_tables(folder, packing):
     head += f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}"
     rows = {
         # MercuryDPM: each contact from both sides, and here with the tangential force of the second
-        "mercury.fstat": ["# 0 24", "# info", "# info", *map(six, fstat)],
+        "mercury.fstat": ["# 0 16", "# info", "# info", *map(six, fstat)],
         # YADE: forces on the second
         "yade.txt": [
             "id1 id2 fnx fny fnz fsx fsy fsz",
