@@ -158,7 +158,7 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
             if shown is not None:
                 now = np.where(np.abs(frame - colours[shown]).max(axis=2) <= COLOUR_DIFFERENCE, shown, now)
             picture, shown = Image.fromarray(now, "P"), now
-            picture.putpalette(palette.getpalette())
+            picture.putpalette(colours.ravel().tolist())
             yield picture
 
     frames, duration = iter(pictures()), round(1000 / rate)

@@ -71,8 +71,8 @@ def material_of(text: str) -> Material:
     """A material of key=value,...; a BadInputError names the word that is wrong."""
     given: dict[str, float] = {}
     for word in text.split(","):
-        key, equals, value = word.partition("=")
-        if key.strip() not in Material._fields or not equals:
+        key, _, value = word.partition("=")
+        if key.strip() not in Material._fields or not value:
             raise BadInputError(f"--material {word.strip()!r}: give {', '.join(Material._fields)}, as in young=7e10")
         given[key.strip()] = number_of(value, f"--material {key.strip()}")
     return Material(**given).checked()

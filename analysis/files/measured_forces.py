@@ -87,11 +87,10 @@ def measured_forces(
     disks, rows = _rows(particles, 5, 6), _rows(contacts, 5)
     steps = np.unique(rows[:, 0])
     step = steps[choose_frame(contacts, [0] * len(steps), frame)]
-    rows = rows[rows[:, 0] == step]
-    if disks.shape[1] == 6:
-        disks = disks[disks[:, 0] == step][:, 1:]
+    disks = disks[disks[:, 0] == step][:, 1:] if disks.shape[1] == 6 else disks
+    rows, ids = rows[rows[:, 0] == step], disks[:, 0]
     walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
-    rows, ids = rows[~walls], disks[:, 0]
+    rows = rows[~walls]
     for strange in np.setdiff1d(rows[:, 1:3], ids):
         raise PackingFileError(f"{contacts}: a contact names disk {strange:g}, which is not in {particles}.")
     # mean of the rows of each pair; the tangent turns with the normal, so that f_t is the same from both sides

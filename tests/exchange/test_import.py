@@ -14,15 +14,7 @@ from reference_layer import BIN
 from table_rows import rows_of
 
 from faultgouge import load
-from faultgouge.analysis import (
-    BadInputError,
-    MindlinLaw,
-    PackingFileError,
-    RunFile,
-    nearest_image,
-    spectrum,
-    stability,
-)
+from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError, RunFile, nearest_image, spectrum, stability
 from faultgouge.analysis.files.atomic_write import SEAL
 from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
 from faultgouge.analysis.files.formats.disks import mass_of_density

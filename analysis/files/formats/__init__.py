@@ -203,11 +203,8 @@ def write_packing(
     found = exported(packing, modes)
     found.particles.update(values or {})
     says: str = _function(WRITERS[path.suffix])(path, [(0.0, found)])
-    what = {
-        "disk" if packing.dimension == 2 else "sphere": len(packing),
-        "contact": len(found.ends),
-        "mode": len(modes),
-    }
+    noun = "disk" if packing.dimension == 2 else "sphere"
+    what = {noun: len(packing), "contact": len(found.ends), "mode": len(modes)}
     return "; ".join(each for each in (", ".join(counted(count, noun) for noun, count in what.items()), says) if each)
 
 
