@@ -64,7 +64,7 @@ def onset(scene: Scene, start: Start) -> Row:
             seen, window = found.windows[0], with_path_error(found, path).windows[0]
             row |= {"fx_c": window.fx_onset, "error": window.error, "error_of_path": window.path_error}
             row |= {"kind": window.kind, "lambda": window.eigenvalue}
-            row |= {"fx_end": window.fx_end, "overlap": window.onset.overlap, "doubtful": len(found.doubtful)}
+            row |= {"fx_end": window.fx_end, "doubtful": len(found.doubtful)}
             row |= pair(path(seen.fx_onset * (1 - DISTANCE_BELOW)), rest.packing, window.eigenvalue)
     return row
 

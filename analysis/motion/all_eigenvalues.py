@@ -78,7 +78,7 @@ def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple
         if inner.shape[0] > least:
             found, marked = _in_slices(inner, own)
         else:
-            found, left, right = eig(inner.toarray(), left=True, right=True)
+            found, left, right = eig(inner.toarray(), left=True)
             chosen = _matters(found, np.abs(np.sum(left.conj() * right, axis=0)))
             marked = Modes(found[chosen], right[:, chosen], left[:, chosen])
         values.append(found)
@@ -122,14 +122,13 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
             except SpectrumError:
                 continue
             low, high = borders[k] if k else -np.inf, borders[k + 1] if k + 1 < pieces else np.inf
-            here = (modes.values.real >= low) & (modes.values.real < high)
-            found[k] = every[(every.real >= low) & (every.real < high)], modes.chosen(here)
+            inside, marked = ((low <= each.real) & (each.real < high) for each in (every, modes.values))
+            found[k] = every[inside], modes.chosen(marked)
         values = np.concatenate([each for each, _ in found])
         off = abs(values.sum() - trace), abs((values**2).sum() - square) / (2 * np.abs(values).max(initial=1e-300))
         if len(values) == size and max(off) <= 1e-3 * spacing:
             return values, Modes.joined([modes for _, modes in found]).placed(order, size)
-        lacking = np.array([len(each) for each, _ in found]) - np.diff(edges)
-        todo = np.flatnonzero(lacking < 0) if block == 4 else np.arange(pieces)
+        todo = np.flatnonzero([len(each) for each, _ in found] < np.diff(edges)) if block == 4 else np.arange(pieces)
     why = f"{len(values)} were found" if len(values) != size else f"their sum is off the trace by {max(off):.3g}"
     raise SpectrumError(f"All eigenvalues of {size} coordinates: {why}.")
 
@@ -137,24 +136,11 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
 def eigenvalues_about(
     matrix: csc_array, shift: float, wanted: Floats, accuracy: float, vectors: tuple[int, int, int]
 ) -> tuple[Complexes, Modes, int]:
-    """All eigenvalues about a shift, and those that matter with vectors; and how many vectors would have been enough.
+    """All eigenvalues about a shift, at least of real parts between two `wanted` ones, and those that matter with
+    vectors; and how many vectors would have been enough.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (n, n)
-        A, its coordinates in the order of elimination.
-    shift : float
-    wanted : ndarray, shape (2,)
-        Real parts between which all are wanted.
-    accuracy : float
-        Error of an eigenvalue by one space.
-    vectors : tuple of int
-        Vectors of a block, of the spaces before their eigenvalues are looked at, and at the most.
-
-    Raises
-    ------
-    SpectrumError
-        If the largest space does not hold them.
+    `accuracy` is the error of an eigenvalue by one space, and `vectors` are those of a block, of the spaces before
+    their eigenvalues are looked at, and at the most. A SpectrumError if the largest space does not hold them.
     """
     (block, first, most), (low, high) = vectors, wanted
     size = matrix.shape[0]
@@ -171,9 +157,7 @@ def eigenvalues_about(
             order = np.argsort(-np.abs(theta), kind="stable")
             with np.errstate(divide="ignore", invalid="ignore"):
                 error = space.residuals(x) / np.abs(theta) ** 2 / np.abs(np.sum(y.conj() * x, axis=0))
-                values = shift + 1 / theta[order]
-            failed = np.flatnonzero(~(error[order] <= accuracy))
-            known = values[: int(failed[0]) if len(failed) else len(values)]
+                known = (shift + 1 / theta[order])[np.logical_and.accumulate(error[order] <= accuracy)]
             distances.append(np.abs(known - shift))
             radii.append(np.inf if len(known) == size else distances[-1].max(initial=0.0))
         height = np.abs(known.imag[(known.real >= low) & (known.real <= high)]).max(initial=0.0)

@@ -104,8 +104,8 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int) -> Modes
     size = matrix.shape[0]
     if not 1 <= count <= size - 2:
         raise ValueError(f"{count} eigenvalues were asked of an operator with {size}; at most {size - 2} are possible.")
-    number = np.float64 if np.imag(near) == 0 else np.complex128
-    shift = near if number is np.complex128 else complex(near).real
+    shift = near if np.imag(near) else complex(near).real
+    number = type(shift)
     matrix = matrix.astype(number)
     shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
     factor = symmetric_lu(shifted, pivoting=DIAGONAL_PIVOT)  # the shift may be next to an eigenvalue
@@ -118,6 +118,4 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int) -> Modes
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
-    spread = np.zeros((2, packing.coordinates, len(values)), dtype=np.complex128)
-    spread[0, active], spread[1, active] = right, left[:, partner]
-    return Modes(values, spread[0], spread[1], axes=packing.axes)
+    return Modes(values, right, left[:, partner], packing.axes).placed(active, packing.coordinates)

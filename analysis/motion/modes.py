@@ -94,14 +94,10 @@ class Modes:
     def of_matrix(cls, matrix: csr_array, axes: int = 3) -> "Modes":
         """All modes by LAPACK, sorted by real part, then imaginary part, without coordinates that feel no force."""
         active = active_coordinates(matrix)
-        right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
-        if len(active) == 0:
-            return cls(np.zeros(0, dtype=np.complex128), right, left, axes)
         inner = matrix[active][:, active].toarray()
-        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-        order = np.lexsort((values.imag, values.real))
-        right[active], left[active] = x[:, order], y[:, order]
-        return cls(values[order], right, left, axes)
+        values, left, right = eig(inner, left=True, overwrite_a=True, check_finite=False)
+        modes = cls(values, right, left, axes).chosen(np.lexsort((values.imag, values.real)))
+        return modes.placed(active, matrix.shape[0])
 
     @classmethod
     def joined(cls, parts: Sequence["Modes"]) -> "Modes":
@@ -135,7 +131,8 @@ class Modes:
     @property
     def rotation(self) -> Floats:
         """Share of rotation in the kinetic energy of each mode, shape (k,)."""
-        return rotation_share(self.right, self.axes)
+        energy = (np.abs(self.right) ** 2).reshape(self.axes, len(self.right) // self.axes, len(self)).sum(axis=1)
+        return np.asarray(energy[self.axes // 2 + self.axes % 2 :].sum(axis=0) / energy.sum(axis=0))
 
 
 def normal_modes(packing: HasConfiguration) -> Modes:
@@ -214,9 +211,3 @@ def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     """
     energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
-
-
-def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
-    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=1)
-    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)

@@ -65,15 +65,10 @@ and to a hundredth where the two displacements have nothing in common."""
 
 
 class OneSidedSystem:
-    """The equations of one configuration, in mass-weighted coordinates.
+    """The equations of one configuration, in mass-weighted coordinates, by K and C of sticking contacts.
 
     A state has several motions, in columns: `time`, displacement `z` and velocity `v`, shape (E, P), and what contacts
     remember: `p` of sliders, shape (B, P), and `r`, shape (R, P), of contacts with two derivatives.
-
-    Parameters
-    ----------
-    motion : Motion
-        K and C of sticking contacts, `Motion.of(packing, sliding=False)`.
 
     Attributes
     ----------
@@ -92,27 +87,23 @@ class OneSidedSystem:
     """
 
     def __init__(self, motion: Motion) -> None:
-        c, active = motion.configuration, motion.active
-        contacts, size = c.contacts, len(active)
-        self.motion, self.configuration = motion, c
+        self.motion, self.configuration = motion, motion.configuration
+        c, size, (rates, forces) = motion.configuration, len(motion.active), rescaling_operators(motion.configuration)
         self.stable_step = float(stable_timestep(c)) if size else 1.0
-        self.weight = csr_array((1 / motion.root_mass, (active, np.arange(size))), shape=(c.coordinates, size))
-        back = csr_array(self.weight.T)
+        self.weight = csr_array((1 / motion.root_mass, (motion.active, np.arange(size))), shape=(c.coordinates, size))
+        back, s, changes = csr_array(self.weight.T), sliders_of(c), ContactChanges.of(c)
         self.residual_force = np.asarray(back @ c.coordinate_force[:, None])
         self._stiffness, self._damping = fast(motion.stiffness), fast(motion.damping)
-        s = sliders_of(c)
         self.grip, self.excess = fast(back @ s.force), fast(s.excess @ self.weight)
         self.viscous_excess = fast(s.viscous_excess @ self.weight * float(motion.dissipative))
         self._rectified, self._viscous = s.rectified[:, None], s.viscous[:, None]
-        two, bound = np.flatnonzero(contacts.two_derivatives), s.contact
-        rates, forces = rescaling_operators(c)
+        two = np.flatnonzero(c.contacts.two_derivatives)
         self.rates, self.wear = fast(rates[two] @ self.weight), fast(back @ forces[:, two])
-        self._worn = fast(csr_array((bound[:, None] == two).astype(float)))  # shape (B, R)
-        changes = ContactChanges.of(c)
-        rows, viscous = fast(changes.rows @ self.weight), fast(changes.viscous @ self.weight)
+        self._worn = fast(csr_array((s.contact[:, None] == two).astype(float)))  # shape (B, R)
+        rows, viscous = (fast(each @ self.weight) for each in (changes.rows, changes.viscous))
         self.changes = replace(changes, rows=rows, viscous=viscous)
-        bears = contacts.friction - np.linalg.norm(contacts.tangential_force, axis=1)
-        self.missing = np.maximum(bears, 0.0)[bound, None]
+        bears = c.contacts.friction - np.linalg.norm(c.contacts.tangential_force, axis=1)
+        self.missing = np.maximum(bears, 0.0)[s.contact, None]
         whole = self.weight if c.constraint is None else c.constraint @ self.weight
         self._translations = fast(csr_array(whole)[: c.dimension * len(c)])
 
@@ -135,13 +126,8 @@ class OneSidedSystem:
     def steps(
         self, state: SimpleNamespace, time_step: float, rise: Floats | None = None, constant: Floats | float = 0.0
     ) -> Iterator[SimpleNamespace]:
-        """One step of velocity Verlet after the other, each of which changes the state.
-
-        Parameters
-        ----------
-        rise, constant : ndarray, shape (E, P), optional
-            Mass-weighted forces, per time, and those that are always there.
-        """
+        """One step of velocity Verlet after the other, each of which changes the state; with mass-weighted forces that
+        rise, per time, and those that are always there."""
         force = self._force(state, rise) + constant
         while True:
             state.v += 0.5 * time_step * force
@@ -164,9 +150,7 @@ class OneSidedSystem:
         if len(state.r):
             force += self.wear @ state.r
         if len(state.p):
-            springs = self.excess @ state.z
-            if len(state.r):
-                springs += self._rectified * (self._worn @ state.r)
+            springs = self.excess @ state.z + self._rectified * (self._worn @ state.r)
             whole = springs + self.viscous_excess @ state.v
             np.maximum(state.p, np.where(self._viscous, whole, springs), out=state.p)
             force -= self.grip @ np.maximum(state.p, whole)
@@ -201,26 +185,17 @@ def follow(
 ) -> Iterator[SimpleNamespace]:
     """What motions have done so far, after one span of time after the other; every stable step is looked at.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        The equations.
-    velocity : ndarray, shape (coordinates, P)
-        Of the start.
-    span : float
-        Time, of which `LOOKS_PER_CHUNK` rows are kept.
-    rise : ndarray, shape (E, P), optional
-        Mass-weighted forces that rise, per time.
-    beside : bool
-        Whether two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
-        residual forces.
+    `velocity` of the start has all coordinates, and `rise`, mass-weighted forces per time, those of the motion. With
+    `beside` two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
+    residual forces.
 
     Yields
     ------
     SimpleNamespace
-        Rows, one a look, L so far: `time`, shape (L,); mean kinetic energies `energy`, largest D `size`; `first`, the
-        smallest multiples of the motions that take a contact to another state, and `size_at_first`, their D there,
-        shape (L, P); and `slid` and `paths`, p and r at the end of the look, shapes (L, B, P) and (L, R, P).
+        Rows, one a look, `LOOKS_PER_CHUNK` a span, L so far: `time`, shape (L,); mean kinetic energies `energy`,
+        largest D `size`; `first`, the smallest multiples of the motions that take a contact to another state, and
+        `size_at_first`, their D there, shape (L, P); and `slid` and `paths`, p and r at the end of the look, shapes
+        (L, B, P) and (L, R, P).
     """
     if beside:
         velocity = np.hstack([velocity, np.zeros((len(velocity), 2))])
@@ -239,10 +214,8 @@ def follow(
             if k % every == 0 or k == count:
                 seen.append([each.copy() for each in (state.z, state.v, state.p, state.r)])
         z, v, p, r = (np.hstack(each) for each in zip(*seen, strict=True))
-        size, first, energy = (
-            each.reshape(len(seen), -1)
-            for each in (system.mean_square_displacement(z), system.changes.first(z, v, p, r), np.sum(v**2, axis=0))
-        )
+        looks = system.mean_square_displacement(z), system.changes.first(z, v, p, r), np.sum(v**2, axis=0)
+        size, first, energy = (each.reshape(len(seen), -1) for each in looks)
         at = first.argmin(axis=0), np.arange(size.shape[1])
         row = energy.mean(axis=0), size.max(axis=0), first[at], size[at], state.p.copy(), state.r.copy()
         rows.append((state.time, *row))
@@ -291,11 +264,9 @@ class OneSidedMotion:
 
 
 def one_sided_motion(
-    packing: HasConfiguration,
-    velocity: ArrayLike | None = None,
-    rise: str | ArrayLike | None = None,
+    packing: HasConfiguration, velocity: ArrayLike | None = None, rise: str | ArrayLike | None = None,
     times: ArrayLike = (0.0,),
-) -> OneSidedMotion:
+) -> OneSidedMotion:  # fmt: skip
     """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
 
     Parameters
@@ -324,7 +295,7 @@ def one_sided_motion(
     if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
         raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
     system = OneSidedSystem.of(packing)
-    c, active, dissipative = system.configuration, system.motion.active, system.motion.dissipative
+    c, motion = system.configuration, system.motion
     push = _on_all_coordinates(c, "velocity", velocity)
     load = np.zeros_like(push) if rise is None else forces_on_coordinates(c, rise)
     pull = np.asarray(system.weight.T @ load)
@@ -333,9 +304,9 @@ def one_sided_motion(
         beginning = next(follow(system, push, end, pull, beside=True))
         least, most = least_scale(beginning), float(beginning.first[:, 0].min())
     flies = c.coordinate_free.copy()
-    flies[active] = False
+    flies[motion.active] = False
     free = np.array([push, load / c.coordinate_mass[:, None]]) * flies[:, None]
-    drag = c.drag_rate if dissipative else 0.0
+    drag = c.drag_rate if motion.dissipative else 0.0
     flight = np.array([[0, 1, 0, 0], [0, -drag, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]])  # of x, v, t g and g
     state, seen = system.start(push), []
     for each in time:
@@ -368,12 +339,7 @@ def _advance_exactly(motion: Motion, state: SimpleNamespace, time: float, rise: 
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces on particles, shape (N, d), on all coordinates, shape (coordinates, 1): a sum where several move as one.
 
-    "fx" is a unit force on each particle of the upper layer along x.
-
-    Raises
-    ------
-    ValueError
-        If the shape does not fit, or there is no upper layer.
+    "fx" is a unit force on each particle of the upper layer along x; ValueError without one, or of another shape.
     """
     if isinstance(rise, str):
         if rise != "fx" or not configuration.top.any():

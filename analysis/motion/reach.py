@@ -96,11 +96,9 @@ def reach_of(system: OneSidedSystem, free: int = 0) -> FieldsByName | None:
     return FieldsByName(energy=energy, gain=gain, time=time, residual_energy=residual, unsettled=unsettled)
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def _radius(system: OneSidedSystem, factors: Factors) -> float:
-    """The smallest root of 2 E with which a contact changes.
-
-    Contacts alone bound their share of S^-1, so that only those are solved for that may be the first.
-    """
+    """The smallest root of 2 E with which a contact changes: only those are solved for that may be the first."""
     c, changes = system.configuration.contacts, system.changes
     count, rows, viscous = len(c), csr_array(changes.rows), csr_array(changes.viscous)
     dashpots = [viscous[i * count : (i + 1) * count] for i in range(3)]
@@ -110,10 +108,9 @@ def _radius(system: OneSidedSystem, factors: Factors) -> float:
     sticks, closed = changes.sticks[:, 0], changes.overlap[:, 0].copy()
     closed[c.normal_stiffness * c.overlap > 1.01 * c.normal_force] *= OVERLAP_CHANGE
     safe, together = 2.0, 64  # normal forces soften the stiffness of a contact alone, by less than this factor
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alone = c.tangential_stiffness + np.nan_to_num(coupling**2 / c.normal_stiffness, nan=0.0, posinf=np.inf)
-        least = np.where(sticks, (bound - force) / np.sqrt(safe * alone + np.trace(lost)), np.inf)
-        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / safe), np.inf))
+    alone = c.tangential_stiffness + np.nan_to_num(coupling**2 / c.normal_stiffness, nan=0.0, posinf=np.inf)
+    least = np.where(sticks, (bound - force) / np.sqrt(safe * alone + np.trace(lost)), np.inf)
+    least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / safe), np.inf))
     least = np.nan_to_num(least, nan=0.0, posinf=np.inf)
     order, best = np.argsort(least, kind="stable"), np.inf
     for begin in range(0, len(order), together):
@@ -124,32 +121,26 @@ def _radius(system: OneSidedSystem, factors: Factors) -> float:
         wanted = np.stack([rows[i * count + here].toarray().T for i in range(3)])
         solved = factors.solve(np.hstack(list(wanted))).reshape(wanted.shape[1], 3, len(here)).transpose(1, 0, 2)
         product = np.einsum("iec,jec->ijc", wanted, solved)
-        with np.errstate(divide="ignore"):
-            opens = np.where(closed[here] > 0, closed[here] / np.sqrt(product[2, 2]), np.inf)
-        turned = np.ones((3, 1, len(here)))
+        opens = closed[here] / np.sqrt(product[2, 2])
+        turned = np.ones((3, len(here)))
         turned[2] = slope[here]
-        both = product * turned * turned.transpose(1, 0, 2) + lost[:, :, here]
-        reaches = np.where(sticks[here], _cone_distance(both, force[here], bound[here]), np.inf)
-        best = min(best, float(opens.min(initial=np.inf)), float(reaches.min(initial=np.inf)))
+        both = product * turned[:, None] * turned + lost[:, :, here]
+        reaches = _cone_distance(both, force[here], bound[here])
+        best = min(best, opens[closed[here] > 0].min(initial=np.inf), reaches[sticks[here]].min(initial=np.inf))
     for begin in range(3 * count, rows.shape[0], 3 * together):
         columns = rows[begin : begin + 3 * together].toarray().T
         size = np.sqrt(np.sum(columns * factors.solve(columns), axis=0))
-        gap = changes.gap[begin - 3 * count : begin - 3 * count + len(size), 0]
-        with np.errstate(divide="ignore"):
-            best = min(best, float((gap / size).min(initial=np.inf)))
-    return best
+        best = min(best, (changes.gap[begin - 3 * count :, 0][: len(size)] / size).min(initial=np.inf))
+    return float(best)
 
 
 def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
-    """The smallest (mu f_n - f_t cos phi) / |n| of each contact, shape (C,), with n = (cos phi, sin phi, -1).
-
-    Norms are those of the products, shape (3, 3, C).
-    """
+    """The smallest (mu f_n - f_t cos phi) / |n| of each contact, n = (cos phi, sin phi, -1), in the norms of products
+    of shape (3, 3, C)."""
     angle = np.linspace(-np.pi, np.pi, 4097)  # half of the way from one to the next counts for 1e-6
     n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
     size = np.sqrt(np.maximum(np.einsum("ia,ijc,ja->ca", n, product, n, optimize=True), 0.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (bound[:, None] - force[:, None] * n[0]) / size
+    distance = (bound[:, None] - force[:, None] * n[0]) / size
     return np.asarray(np.nan_to_num(distance, nan=np.inf, posinf=np.inf).min(axis=1))
 
 
@@ -205,11 +196,9 @@ def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:
     motion = system.motion
     start = np.random.default_rng(0).standard_normal(len(motion.active))
     s, shape, _ = motion_near(motion.stiffness, motion.damping, s * (1 + 1e-7), start)
-    turns = np.exp(2j * np.pi * np.arange(64) / 64)
-    z = np.real(shape[:, None] * turns)
-    v = np.real(s * shape[:, None] * turns)
+    turned = shape[:, None] * np.exp(2j * np.pi * np.arange(64) / 64)
     slid, paths = (np.zeros((matrix.shape[0], 64)) for matrix in (system.excess, system.rates))
-    first = system.changes.first(z, v, slid, paths)
+    first = system.changes.first(turned.real, (s * turned).real, slid, paths)
     at = int(first.argmin())
-    found = float(first[at] ** 2 * system.mean_square_displacement(z)[at])
+    found = float(first[at] ** 2 * system.mean_square_displacement(turned.real)[at])
     return found if np.isfinite(found) else None

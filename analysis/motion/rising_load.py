@@ -70,6 +70,7 @@ DRAG = 20.0
 VIBRATION_SHARE = 0.05
 """Vibration over drift above which a packing vibrates, and below which it follows the load."""
 
+NUMBERS = "drift", "vibration", "drift_error", "vibration_error", "steady"
 EVENTS = "reaches Coulomb's bound", "opens", "closes", "at Coulomb's bound turns its force", "slides back"
 
 
@@ -134,17 +135,16 @@ def motion_under_load(
         velocity, paths, slid = (np.asarray(each)[:, :1] / span[0] for each in span[1:4])
     else:
         paths, slid = np.abs(system.rates @ velocity), np.zeros((0, 1))
-        found = {"drift": float(np.sqrt(np.mean(system.displacement(velocity) ** 2))), "drift_error": 0.0}
-        found |= {"vibration": 0.0, "vibration_error": 0.0, "steady": True}
-        found |= {"time": None, "span": None, "other_start": None}
+        solved = float(np.sqrt(np.mean(system.displacement(velocity) ** 2)))
+        found = dict(zip(NUMBERS, (solved, 0.0, 0.0, 0.0, True), strict=True))
+        found |= dict.fromkeys(("time", "span", "other_start"))
     counts = slid > 0.1 * slid.max(initial=0.0)
     reached = float((system.missing[counts] / slid[counts]).max(initial=0.0))
     change, event = next_change(system, velocity, slid, paths)
     drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
-    least = max(reached, moved)
+    least = max(reached, PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0)
     if change is not None and least >= change:
-        what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
+        what = "contacts counted as at Coulomb's bound reach it" if reached == least else "residual forces count less"
         raise NotFollowedError(
             f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
             "bring the packing to rest more closely"
@@ -153,10 +153,7 @@ def motion_under_load(
 
 
 def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats | None:
-    """The drift, mass-weighted, shape (E, 1); None if the motion is to be followed.
-
-    Raises NotFollowedError if the load accelerates a motion that no force opposes.
-    """
+    """The drift, mass-weighted, shape (E, 1); None if the motion is to be followed."""
     motion, way = system.motion, np.zeros(system.rates.shape[0])
     for _ in range(60):  # a few times are enough where the solution is unique
         a = motion.stiffness
@@ -174,17 +171,7 @@ def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats 
 
 
 def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
-    """v of A v = load, without the motions that no force opposes, shape (E, P).
-
-    Parameters
-    ----------
-    motion : Motion
-        A.
-    load : ndarray, shape (E, P)
-        Mass-weighted forces.
-    free : int
-        Motions that no force opposes.
-    """
+    """v of A v = load, mass-weighted forces of shape (E, P), without the motions that no force opposes, so many."""
     matrix = motion.stiffness
     shift = 1e-11 * float(np.abs(matrix.data).max(initial=0.0))  # free motions do not divide by zero
     if free:
@@ -212,13 +199,11 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
         report_progress(f"under the rising load: t = {now:.4g}, vibration {seen:.3g}")
         if not seen < 1e12 * means_of_windows(system, windows[:1]).max():
             raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by 1e12")
-        if time is None and 2 * len(windows) >= most:
-            known = [
-                each.steady and each.vibration > VIBRATION_SHARE * each.drift and each.vibration_error is not None
-                and each.vibration_error <= 0.1 * each.vibration for each in _of_starts(system, windows)[1]
-            ]  # fmt: skip
-            if all(known):
-                break
+        if time is None and 2 * len(windows) >= most and all(
+            each.steady and each.vibration > VIBRATION_SHARE * each.drift
+            and (each.vibration_error or np.inf) <= 0.1 * each.vibration for each in _of_starts(system, windows)[1]
+        ):  # fmt: skip
+            break
     after = windows[FADE_WINDOWS:] or windows
     quarters = _in_parts(system, after)[0, 3:, 0]
     # the middles of two quarters; of particles whose dashpots alone bear the load the mean velocity rises as the time,
@@ -236,26 +221,15 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
 
 
 def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Window]:
-    """One window after the other under a load that rises, from two starts: with a drag on all coordinates, and on all
-    but rotations, as one packing may vibrate in two ways. Large packings, and bodies, whose coordinates are of another
-    kind, have one start.
+    """One window after the other, each of a `length` of time, under a load that rises (mass-weighted, shape (E, 1)).
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    load : ndarray, shape (E, 1)
-        Mass-weighted forces per unit of time.
-    length : float
-        Time of a window; the drag fades out in `FADE_WINDOWS` of them.
+    From two starts: with a drag on all coordinates, and on all but rotations, as one packing may vibrate in two ways.
+    Large packings, and bodies, whose coordinates are of another kind, have one start.
     """
     c = system.configuration
     spins = system.motion.active[:, None] >= c.dimension * len(c)
-    one = c.constraint is not None or c.coordinates > 6000 or not spins.any()
-    drag = np.ones((len(spins), 1))
-    if not one:
-        drag = np.hstack([drag, ~spins])
-    starts = drag.shape[1]
+    starts = 1 if c.constraint is not None or c.coordinates > 6000 or not spins.any() else 2
+    drag = np.hstack([np.ones(spins.shape), ~spins])[:, :starts]
     state, load = system.start(np.zeros((c.coordinates, starts))), np.repeat(load, starts, axis=1)
     samples, velocities = 400, np.zeros((2, len(c), c.dimension, starts))
     for number in count():
@@ -275,9 +249,7 @@ def means_of_windows(system: OneSidedSystem, windows: list[Window]) -> Floats:
     """Root mean squares over particles and axes, of a span of windows, shape (2, S)."""
     time, moved, _, _, velocities, squares = (sum(each) for each in zip(*windows, strict=True))
     left = np.maximum(squares / time - (velocities / time) ** 2, 0.0)
-    return np.asarray(
-        np.sqrt([np.mean(each, axis=(0, 1)) for each in ((system.displacement(moved) / time) ** 2, left)])
-    )
+    return np.sqrt(np.mean([(system.displacement(moved) / time) ** 2, left], axis=(1, 2)))
 
 
 def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Window], list[FieldsByName]]:
@@ -286,20 +258,15 @@ def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Wind
     for span, differs in ((after, TREND), (after[len(after) // 2 :], HALVES_DIFFERENCE)):
         found = []
         for parts in _in_parts(system, span):
-            (drift, vibration), before, late = parts[:3]
-            alike = abs(late[1] - before[1]) <= differs * late[1] and late[1] > VIBRATION_SHARE * late[0]
-            vanishes = (
-                late[1] <= VIBRATION_SHARE * late[0]
-                and late[1] <= max(2 * before[1], 1e-6 * late[0])  # rounding of the root
-                and vibration <= 2 * VIBRATION_SHARE * drift
-            )
+            (drift, vibration), (_, before), (later, late) = parts[:3]
+            follows = late <= VIBRATION_SHARE * later
+            vanishes = late <= max(2 * before, 1e-6 * later)  # rounding of the root
+            vanishes &= vibration <= 2 * VIBRATION_SHARE * drift
+            steady = bool(vanishes if follows else abs(late - before) <= differs * late)
             # of the mean of four, doubled, since quarters of a slow cycle are not independent
             spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0])  # and of time steps
-            drift_error, vibration_error = spread.tolist() if np.all(np.isfinite(parts)) else (None, None)
-            found.append(FieldsByName(
-                drift=float(drift), drift_error=drift_error, vibration=float(vibration),
-                vibration_error=vibration_error, steady=bool(alike or vanishes),
-            ))  # fmt: skip
+            errors = spread.tolist() if np.all(np.isfinite(parts)) else [None, None]
+            found.append(FieldsByName(zip(NUMBERS, [*parts[0].tolist(), *errors, steady], strict=True)))
         if all(each.steady for each in found):
             break
     return span, found
@@ -318,16 +285,8 @@ def next_change(
 ) -> tuple[float | None, str | None]:
     """At which increase of the load a contact changes first, and what it does; None twice if none is known.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    velocity : ndarray, shape (E, 1)
-        Mean mass-weighted velocity at the rate 1.
-    slid : ndarray, shape (B, 1)
-        Mean rates at which contacts at the bound slide, force.
-    paths : ndarray, shape (R, 1)
-        Mean rates of the paths of the overlaps of contacts with two derivatives.
+    By the mean mass-weighted velocity at the rate 1, shape (E, 1), and the mean rates at which contacts at the bound
+    slide, force, (B, 1), and of the paths of the overlaps of contacts with two derivatives, (R, 1).
     """
     if system.configuration.stiffness is not None:
         return None, None

@@ -31,21 +31,15 @@ decay by a factor.
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
 largest eigenvalue is :math:`\mu^2`. Masses are applied to vectors, and K + mu C is one matrix.
 
-**What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is. No iteration
-can prove that this eigenvalue is the largest. Of many coordinates there is one Krylov space, and its first vector is
-random. For a symmetric matrix of n rows, m products miss more than a share epsilon of the largest eigenvalue with a
-probability below :math:`1.648 \sqrt n\, e^{-(2m - 1)\sqrt\epsilon}` (Kuczynski and Wozniakowski, SIAM J. Matrix Anal.
-Appl. 13, 1094, 1992). The error of the step follows from this epsilon.
+**What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is, and not
+that it is the largest. From a random start, m products with a symmetric matrix of n rows miss more than a share epsilon
+of the largest eigenvalue with a probability below :math:`1.648 \sqrt n\, e^{-(2m - 1)\sqrt\epsilon}` (Kuczynski and
+Wozniakowski, SIAM J. Matrix Anal. Appl. 13, 1094, 1992), which gives the error of the step of many coordinates.
 
-What is sure is that no eigenvalue exceeds the largest sum of a row in absolute value (Gershgorin). With k and c these
-sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
-
-.. math:: \mu^2 \le k + \mu c, \qquad \mu \le \tfrac12 \left(c + \sqrt{c^2 + 4k}\right) .
-
-The step 2/mu of this bound is stable for certain, and shorter than the limit.
+No eigenvalue exceeds the largest sum of a row in absolute value (Gershgorin): with k and c these sums of
+:math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`, :math:`\mu \le \tfrac12 (c + \sqrt{c^2 + 4k})`. The step
+2/mu of this bound is stable for certain, and shorter than the limit.
 """
-
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import eig
@@ -89,20 +83,14 @@ class StableTimestep(float):
         return made
 
 
-DashpotVelocity = Literal["half-step", "extrapolated"]
-"""The velocity that dashpots feel."""
-
-DASHPOT_WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
-"""c, the weight of dashpots in the limit."""
-
-
 def stable_timestep(
     of: float | HasConfiguration,
     stiffness: csr_array | None = None,
     damping: csr_array | None = None,
-    dashpot_velocity: DashpotVelocity | None = None,
 ) -> StableTimestep:
-    r"""The largest stable time step of velocity Verlet.
+    """The largest stable time step of velocity Verlet.
+
+    Dashpots of this package's law feel the extrapolated velocity, all others that of the half step, as in LAMMPS.
 
     Parameters
     ----------
@@ -110,9 +98,6 @@ def stable_timestep(
         omega_max, radian / time, or a configuration with its dashpots.
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
-    dashpot_velocity : {"half-step", "extrapolated"}, optional
-        The velocity that dashpots feel; by default "extrapolated" for the law of this package, and "half-step", as in
-        LAMMPS's own styles, for all others.
 
     Returns
     -------
@@ -133,15 +118,15 @@ def stable_timestep(
     if not stiffness.nnz:
         return StableTimestep(np.inf)
     c = of.configuration.contacts
-    ours = len(c) > 0 and not c.viscous_slider.any()
     if damping is None and of.damped:
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
-    if damping is not None:
-        damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
+    if damping is not None and len(c) and not c.viscous_slider.any():  # the law of this package: c = 2
+        damping = 2.0 * damping
     scale = 1.0 / np.sqrt(of.coordinate_mass)
     found = _limit(scale, stiffness, damping)
+    k, g = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
     # rounding may take the limit below the bound where the two are the same
-    return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
+    return StableTimestep(found, found.error, min(float(found), 4.0 / (g + float(np.sqrt(g**2 + 4 * k)))))
 
 
 def rayleigh_timestep(configuration: Configuration) -> float | None:
@@ -179,27 +164,17 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     return float(np.pi * travel[configuration.free].min() / (0.1631 * nu + 0.8766))
 
 
-def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
-    """Upper bound of mu by the largest sums of rows, 1 / time."""
-    k, c = (0.0 if each is None else float(np.max(scale * (abs(each) @ scale))) for each in (stiffness, damping))
-    return 0.5 * (c + float(np.sqrt(c**2 + 4 * k)))
-
-
 def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
     """2/mu by the largest eigenvalue: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
-    if damping is None:
-        value, _, error = _largest_eigenvalue(scale, stiffness, TIMESTEP_TOLERANCE)
-        step = 2.0 / float(np.sqrt(value))
-        return StableTimestep(step, 0.5 * step * error)
     mu, error, change = 0.0, 0.0, np.inf
     for k in range(7):
-        # a rough mu of K alone is where the steps begin
-        tolerance = TIMESTEP_TOLERANCE if k else 0.1
-        value, moved, error = _largest_eigenvalue(scale, csr_array(stiffness + mu * damping), tolerance)
-        slope = float(moved @ (damping @ moved))
+        rough = damping is not None and k == 0  # a rough mu of K alone is where the steps begin
+        matrix = stiffness if damping is None else csr_array(stiffness + mu * damping)
+        value, moved, error = _largest_eigenvalue(scale, matrix, 0.1 if rough else TIMESTEP_TOLERANCE)
+        slope = 0.0 if damping is None else float(moved @ (damping @ moved))
         before, mu = mu, 0.5 * (slope + float(np.sqrt(slope**2 + 4 * abs(value - slope * mu))))
-        change = abs(mu - before) / mu
-        if k and change <= max(error, TIMESTEP_TOLERANCE):
+        change = 0.0 if damping is None else abs(mu - before) / mu
+        if not rough and change <= max(error, TIMESTEP_TOLERANCE):
             break
     return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * error + change))
 

@@ -21,7 +21,7 @@ from scipy.linalg import LinAlgError
 
 from ..arrays import Complexes
 from ..errors import NoEquilibriumError
-from .motions import Motions, System, eigenvalues_near, overlap_near
+from .motions import Motions, System, eigenvalues_near
 from .onset import Edge, Kind
 
 TrackPoint = tuple[float, Complexes, Complexes]
@@ -178,7 +178,7 @@ class Track:
         if smooth:
             steady = 1e-9 * middle.frequency  # |Im s| that counts as zero
             kind = "coalescence" if self.pairs else "steady" if mean.imag <= steady else "hopf"
-        return Edge(fx, error + middle.balance, value, overlap_near(middle, value), kind)
+        return Edge(fx, error + middle.balance, value, kind)
 
 
 def nearest_pair(values: Complexes, expected: Complexes) -> tuple[Complexes, list[int]]:

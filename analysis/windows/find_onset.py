@@ -1,9 +1,8 @@
 """The search for the onset along a ramp, and for windows: with dissipation or without, all windows or the first."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +14,8 @@ from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..progress import Watch, report_progress, show_progress
-from .motions import Motions, System, force_bearing
+from ..progress import report_progress, show_progress
+from .motions import System, force_bearing
 from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
 from .quiet import Quiet
 from .search import Look, Search, SystemOfLoad
@@ -37,30 +36,14 @@ def check_increasing(forces: ArrayLike) -> Floats:
     return loads
 
 
-def windows_up_to(
+def find_windows(
     system: SystemOfLoad,
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
     look: Look = lambda below, above: (),
     first: bool = False,
-    decompose: Callable[[System], Motions] = Motions.of,
-) -> Iterator[tuple[float, tuple[Window, ...]]]:
-    """Yield each load but the smallest, with all windows up to this load; the windows are those of `find_windows`."""
-    loads = check_increasing(forces)
-    # the pair of a narrower window would grow more slowly than any run can show
-    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
-    start = system(float(loads[0]))
-    few = Quiet(decompose) if start.damping is not None and len(start.active) > FEW_COORDINATES else None
-    for fx, windows in Search(system, narrowest, few, first, decompose).along(loads, look):
-        known = (
-            f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
-        )
-        report_progress(f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}{known}")
-        yield fx, windows
-
-
-def find_windows(system: SystemOfLoad, forces: ArrayLike, **how: Any) -> tuple[Window, ...]:
+) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.
 
     Parameters
@@ -75,8 +58,6 @@ def find_windows(system: SystemOfLoad, forces: ArrayLike, **how: Any) -> tuple[W
         Two neighbouring loads -> further loads between them at which to look; these may have no equilibrium.
     first : bool
         Go no farther than the increment in which the first window begins.
-    decompose : callable, optional
-        System -> all of its motions.
 
     Returns
     -------
@@ -88,7 +69,16 @@ def find_windows(system: SystemOfLoad, forces: ArrayLike, **how: Any) -> tuple[W
     ValueError
         If the loads are not at least two increasing numbers.
     """
-    *_, (_, windows) = windows_up_to(system, forces, **how)
+    loads, windows = check_increasing(forces), ()  # type: Floats, tuple[Window, ...]
+    # the pair of a narrower window would grow more slowly than any run can show
+    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
+    start = system(float(loads[0]))
+    few = Quiet() if start.damping is not None and len(start.active) > FEW_COORDINATES else None
+    for fx, windows in Search(system, narrowest, few, first).along(loads, look):
+        says = f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}"
+        if windows:
+            says += f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}"
+        report_progress(says)
     return windows
 
 
@@ -130,7 +120,6 @@ def find_onset(
     *,
     dissipation: bool = False,
     first: bool = False,
-    watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
     limits: Limits = LIMITS,
@@ -157,8 +146,6 @@ def find_onset(
     first : bool
         Seek only the first window. No equilibrium beyond the increment in which it begins is then asked for. The end of
         the window is None if it lies beyond this increment.
-    watch : callable, optional
-        Told in words which part of a large packing is being searched.
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
     folder : Path, optional
@@ -175,8 +162,8 @@ def find_onset(
         If no motion grows at any load; with dissipation a NoGrowthError, which has the onset without dissipation.
     TurningPointError
         If an eigenvalue is negative before any is complex.
-    LostPairError, SliceError
-        Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
+    SliceError
+        Of a large packing, if a part of the spectrum is not found.
     OutputError, DamagedSliceError
         If a file in the folder cannot be written, or read.
     ValueError
@@ -187,21 +174,12 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    takes_all, ends, kept = takes_all_modes(start, limits), list[float](), dict[float, Motions]()
-
-    def decompose(system: System) -> Motions:
-        """All motions; those without dissipation are kept for the search with it, which begins with them."""
-        if system.damping is None and system.fx in kept:
-            return kept[system.fx]
-        found = Motions.of(system)
-        if system.damping is None and 16 * found.right.size * (len(kept) + 1) < 2e8:  # bytes
-            kept[system.fx] = found
-        return found
+    takes_all, ends = takes_all_modes(start, limits), list[float]()
 
     def windows_of(system: SystemOfLoad, look: Look = lambda below, above: ()) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if takes_all:
-            windows = find_windows(system, loads, look=look, first=first, decompose=decompose)
+            windows = find_windows(system, loads, look=look, first=first)
             return windows[:1] if first else windows, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
@@ -224,98 +202,60 @@ def find_onset(
 
     def undamped_onset() -> Onset:
         windows, doubtful = (), ()  # type: tuple[Window, ...], Increments
-        negative, at_start, opened = negative_eigenvalues(force_bearing(start)), None, None
+        negative, opened = negative_eigenvalues(force_bearing(start)), None
+        at_start = _unstable_at_start(start, bool(len(negative)))
         if len(negative):
             ends.append(start.fx)
-            opened = float(negative[0]), 1.0
-        # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        elif (first or not takes_all) and start.law is None:
-            at_start = _complex_at_start(start)
-        if opened is None and at_start is None:
+            opened = float(negative[0])
+        elif at_start is not None:
+            opened = max(at_start.pairs, key=lambda each: each.growth_rate).eigenvalue.real
+        if opened is None or (takes_all and not first and not len(negative)):
             try:
                 windows, doubtful = windows_of(undamped)
             except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-                at_start = _complex_at_start(start)
-                if at_start is None:
+                if opened is None:
                     raise
-        if at_start is None and (opened or (windows and windows[0].kind == "start")):
-            at_start = spectrum(force_bearing(start)) if takes_all else _complex_at_start(start)
-        if opened is None and at_start is not None and not (takes_all and windows):
-            fastest = max(at_start.pairs, key=lambda each: each.growth_rate)
-            opened = fastest.eigenvalue.real, fastest.overlap
-        if opened is not None:
-            windows = (Window(Edge(start.fx, 0.0, *opened, "start"), None),)
+        if opened is not None and not windows:
+            windows = (Window(Edge(start.fx, 0.0, opened, "start"), None),)
         if not windows:
             raise OnsetError.of_search(float(loads[-1]), doubtful)
-        complete = takes_all and not first and not windows[0].eigenvalue < 0
+        complete = takes_all and not first and not len(negative)
         return Onset(windows, complete, doubtful, at_start, min(ends, default=None))
 
-    def undamped_onset_or_none() -> Onset | None:
-        with suppress(OnsetError, NoEquilibriumError):
-            return undamped_onset()
-        return None
-
-    def damped(fx: float) -> System:
-        return System.of(at(fx), True)
-
-    with show_progress(watch):
-        if not dissipation:
-            return undamped_onset()
-        if takes_all:
-            report_progress(f"pairs that become complex without dissipation, up to F_x = {loads[-1]:.6g}")
-            beside = undamped_onset_or_none()
-            look = _inside(lambda fx: System.of(equilibrium(fx)), loads, beside)
-            windows, doubtful = windows_of(damped, look)
-        else:
-            with show_progress(what="with dissipation, "):
-                windows, doubtful = windows_of(damped)
-            with show_progress(what="without dissipation, "):
-                beside = undamped_onset_or_none()
-        if not windows:
-            finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
-            raise NoGrowthError(finding, "raise the largest load", undamped=beside)
-        return Onset(windows, takes_all and not first, doubtful, undamped=beside)
-
-
-def _inside(undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> Look:
-    """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
-
-    Where the first window alone is known, the others are sought as far as the ramp is walked.
-    """
-    windows: tuple[Window, ...] = () if known is None else known.windows
-    reached, walk = np.inf, iter(())  # type: float, Iterator[tuple[float, tuple[Window, ...]]]
-    if known is not None and not known.complete:
-        begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
-        if begin < len(loads) - 1:
-            reached, walk = float(loads[begin]), windows_up_to(undamped, loads[begin:])
-
-    def look(below: float, above: float) -> list[float]:
-        """The onsets between two loads, and the middles of the windows that end in between."""
-        nonlocal reached, windows
-        if not windows or above <= windows[0].fx_onset:
+    def inside(below: float, above: float) -> list[float]:
+        """Onsets and middles of undamped windows between two loads: growth without dissipation is largest there."""
+        if beside is None or above <= beside.fx_c:
             return []
-        while reached < above:
-            try:
-                reached, windows = next(walk)
-            except (StopIteration, NoEquilibriumError):
-                reached = np.inf
-        onsets = [each.fx_onset for each in windows if below < each.fx_onset < above]
+        windows = beside.windows
+        if not beside.complete:  # only the first is known
+            with suppress(NoEquilibriumError):
+                windows = find_windows(lambda fx: System.of(at(fx)), [below, above])
         ends = [(each.fx_onset, each.fx_end) for each in windows if each.fx_end is not None]
-        return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
+        middles = [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
+        return [each.fx_onset for each in windows if below < each.fx_onset < above] + middles
 
-    return look
+    if not dissipation:
+        return undamped_onset()
+    beside: Onset | None = None
+    with suppress(OnsetError, NoEquilibriumError), show_progress(what="without dissipation, "):
+        beside = undamped_onset()
+    with show_progress(what="with dissipation, "):
+        windows, doubtful = windows_of(lambda fx: System.of(at(fx), True), inside)
+    if not windows:
+        finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
+        raise NoGrowthError(finding, "raise the largest load", undamped=beside)
+    return Onset(windows, takes_all and not first, doubtful, undamped=beside)
 
 
-def _complex_at_start(start: HasConfiguration) -> Spectrum | None:
-    """The spectrum of a packing at the smallest load, if it has a complex pair.
+def _unstable_at_start(start: HasConfiguration, buckles: bool) -> Spectrum | None:
+    """The spectrum of a packing that is unstable at the smallest load; None of others, and of large packings.
 
-    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
-    as without tangential forces, nothing is computed: it is its transpose but for the rounding of sums over contacts.
+    Of a symmetric operator, as without tangential forces, nothing is computed unless it buckles: it is its transpose
+    but for the rounding of sums over contacts.
     """
-    if start.coordinates > LAPACK_COORDINATES:
-        return None
     matrix = System.of(start).stiffness
-    if abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max():
+    symmetric = abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max()
+    if start.coordinates > LAPACK_COORDINATES or (symmetric and not buckles):
         return None
     found = spectrum(force_bearing(start))
-    return found if found.pairs else None
+    return found if len(found.unstable) else None

@@ -15,14 +15,14 @@ and G by dA and dG moves an eigenvalue by
           \mathrm ds = - \frac{y^H (\mathrm dA + s\, \mathrm dG)\, x}{y^H (2 s + G)\, x} .
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, eig, eigvals, lu_factor, lu_solve
+from scipy.linalg import LinAlgError, eig, eigvals
 from scipy.sparse import csc_array, csr_array, eye_array, issparse
 
 from ..arrays import Complexes, Floats, Indices
@@ -34,9 +34,6 @@ from ..operators.stiffness import stiffness_matrix
 
 DENSE = 200
 """Rows of A or Z up to which LAPACK's eigenvalues, all of them, take no longer than the few next to a point."""
-
-DENSE_FACTORS = 600
-"""Coordinates up to which dense factors of A - sigma take less time than sparse ones."""
 
 AnyConfiguration = TypeVar("AnyConfiguration", bound=HasConfiguration)
 
@@ -254,17 +251,6 @@ def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexe
     return Inverse(system, point).eigenpairs(count)[0]
 
 
-def overlap_near(system: System, value: complex) -> float:
-    """|y^H x| of the motion next to a value, with dissipation |y^H (2 s + G) x| / |2 s|, by inverse iteration."""
-    inverse = Inverse(system, value)
-    x = y = np.random.default_rng(0).standard_normal(len(system.active))
-    for _ in range(4):
-        x, y = (each / np.linalg.norm(each) for each in (inverse.solve(x), inverse.solve(y, True)))
-    if system.damping is None:
-        return float(abs(np.vdot(y, x)))
-    return float(abs(np.vdot(y, 2 * inverse.shift * x + inverse.damping @ x)) / abs(2 * inverse.shift))
-
-
 class Inverse:
     """(A - sigma)^(-1) or (Z - sigma)^(-1) next to a point, from factors of A - sigma or sigma^2 + sigma G + A.
 
@@ -276,8 +262,6 @@ class Inverse:
         sigma.
     damping : scipy.sparse.csr_array or None
         G on the active coordinates.
-    solve : callable
-        A vector, and whether the adjoint is wanted -> (A - sigma)^(-1) or (sigma^2 + sigma G + A)^(-1) times it.
     """
 
     def __init__(self, system: System, point: complex) -> None:
@@ -286,16 +270,15 @@ class Inverse:
         self.size, one = len(system.active), eye_array(len(system.active))
         a, self.damping = (*map(csr_array, system.inner), None)[:2]
         matrix = a - shift * one if self.damping is None else a + shift * self.damping + shift**2 * one
-        self.solve: Callable[..., Any]
-        if self.size <= DENSE_FACTORS:
-            dense = lu_factor(matrix.toarray(), overwrite_a=True, check_finite=False)
-            self.solve = lambda b, adjoint=False: lu_solve(dense, b, trans=2 * adjoint, check_finite=False)
-            return
         try:
-            sparse = general_lu(csc_array(matrix))
+            self._factors = general_lu(csc_array(matrix))
         except SingularMatrixError:
-            sparse = general_lu(csc_array(matrix + 1e-15 * abs(matrix).max() * one))
-        self.solve = lambda b, adjoint=False: sparse.solve(np.asarray(b, matrix.dtype), trans="H" if adjoint else "N")
+            self._factors = general_lu(csc_array(matrix + 1e-15 * abs(matrix).max() * one))
+        self._number = matrix.dtype
+
+    def solve(self, b: Any, adjoint: bool = False) -> Any:
+        """(A - sigma)^(-1) or (sigma^2 + sigma G + A)^(-1), or its adjoint, times vectors."""
+        return self._factors.solve(np.asarray(b, self._number), trans="H" if adjoint else "N")
 
     def eigenpairs(self, count: int, adjoint: bool = False) -> tuple[Complexes, Any]:
         """The nearest eigenvalues with right vectors, or those of the adjoint (ARPACK); LinAlgError if they do not

@@ -32,8 +32,6 @@ class Edge:
     eigenvalue : float or complex
         Without dissipation the double eigenvalue (the real part of the pair if it does not coalesce there),
         1 / time^2; with it s, complex, 1 / time.
-    overlap : float
-        Smallest |y^H x| met at the edge; at an exceptional point it is the root of the rounding error.
     kind : {"coalescence", "hopf", "steady", "contact change", "start"}
         Two real eigenvalues that meet; Re s that goes through zero, with Im s or without; a jump of the equilibrium; or
         nothing, as the motion grows at the smallest load.
@@ -42,7 +40,6 @@ class Edge:
     fx: float
     error: float
     eigenvalue: float | complex
-    overlap: float
     kind: Kind
 
 
@@ -216,12 +213,8 @@ class Onset(TableDisplay):
     __str__ = describe
 
     def __repr__(self) -> str:
-        counted_windows = len(self.windows) if self.complete else "not counted, as the search ended with the first"
-        parts = [self.describe(), f"windows: {counted_windows}"]
-        if self.equilibria:
-            reached = counted(len(self.equilibria), "equilibrium", "equilibria")
-            parts = [f"mu = {self.mu:g}", *parts, f"{reached} up to F_x = {self.equilibria[-1].fx:g}"]
-        return f"<Onset: {', '.join(parts)}>"
+        known = len(self.windows) if self.complete else "not counted, as the search ended with the first"
+        return f"<Onset: {self}, windows: {known}>"
 
     def _rows(self) -> dict[str, str]:
         rows = {}
@@ -234,14 +227,15 @@ class Onset(TableDisplay):
     def as_dict(self) -> dict[str, Any]:
         """For JSON: fx_c, error, error_of_path, windows, doubtful, and more with dissipation or without."""
         undamped, start, first = self.undamped, self.at_start, self.windows[0]
-        doubtful = [list(increment) for increment in self.doubtful]
-        known: dict[str, Any] = {"fx_c": self.fx_c, "error": self.error, "error_of_path": first.path_error}
-        known |= {"windows": [window.as_dict() for window in self.windows]}
+        known: dict[str, Any] = {
+            "fx_c": self.fx_c, "error": self.error, "error_of_path": first.path_error,
+            "windows": [window.as_dict() for window in self.windows], "doubtful": list(map(list, self.doubtful)),
+        }  # fmt: skip
         if first.dissipative:
             by_itself = None if undamped is None else {"fx_c": undamped.fx_c, "error": undamped.error}
-            return known | {"undamped": by_itself, "doubtful": doubtful, "flows_beyond": self.flows_beyond}
-        unstable: dict[str, float] | None = None
-        if start is not None:
-            unstable = {"pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()}
-        known |= {"complete": self.complete, "doubtful": doubtful}
-        return known | {"modes": None, "unstable_at_start": unstable, "branch_ends": self.ends}
+            return known | {"undamped": by_itself, "flows_beyond": self.flows_beyond}
+        unstable = None if start is None else {
+            "pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()
+        }  # fmt: skip
+        known |= {"complete": self.complete, "modes": None, "unstable_at_start": unstable, "branch_ends": self.ends}
+        return known

@@ -33,8 +33,14 @@ class Plane:
     @classmethod
     def of(cls, state: Motions, members: Sequence[int]) -> "Plane":
         """Of one of a complex pair, or of two real modes of a state."""
-        right, left = (_plane(each[:, list(members)]) for each in (state.right, state.left))
+        both = (each[:, list(members)] for each in (state.right, state.left))
+        right, left = (np.linalg.svd(np.hstack([v.real, v.imag]), full_matrices=False)[0][:, :2] for v in both)
         return cls(state.system, right, left)
+
+    @classmethod
+    def about(cls, state: Motions, eigenvalue: float) -> "Plane":
+        """Of the complex pair, or the two real modes, closest to an eigenvalue, 1 / time^2."""
+        return cls.of(state, _largest(state, 1 / (np.abs(state.values - eigenvalue) + np.finfo(float).tiny)))
 
     @cached_property
     def block(self) -> Floats:
@@ -60,7 +66,7 @@ class Plane:
     def closest(self, state: Motions) -> list[int]:
         """One of a complex pair, or two real modes, that lie closest to these planes; ValueError of a single mode."""
         weight = np.linalg.norm(self.right.T @ state.right, axis=0) * np.linalg.norm(self.left.T @ state.left, axis=0)
-        return _best(state, weight)
+        return _largest(state, weight)
 
     def at(self, system: System) -> "Plane":
         """The closest two modes at another load."""
@@ -68,21 +74,15 @@ class Plane:
         return Plane.of(state, self.closest(state))
 
 
-def pair_about(state: Motions, eigenvalue: float) -> Plane:
-    """The complex pair, or the two real modes, closest to an eigenvalue, 1 / time^2."""
-    return Plane.of(state, _best(state, 1 / (np.abs(state.values - eigenvalue) + np.finfo(float).tiny)))
-
-
-def _best(state: Motions, weight: Floats) -> list[int]:
+def _largest(state: Motions, weight: Floats) -> list[int]:
     """One of a complex pair, or two real modes, with the largest sum of weights."""
     alone, pairs = np.flatnonzero(~state.grows), np.flatnonzero(state.grows)
-    best = [int(k) for k in alone[np.argsort(weight[alone])[-2:]]]
-    two = weight[best].sum() if len(best) == 2 else -np.inf
-    if len(pairs) and 2 * weight[pairs].max() > two:
-        return [int(pairs[np.argmax(weight[pairs])])]
-    if len(best) < 2:
+    best = alone[np.argsort(weight[alone])[-2:]]
+    pair = pairs[np.argsort(weight[pairs])[-1:]]
+    if len(best) < 2 and not len(pair):
         raise ValueError("a system of one mode has no pair")
-    return best
+    two = weight[best].sum() if len(best) == 2 else -np.inf
+    return [int(k) for k in (pair if len(pair) and 2 * weight[pair[0]] > two else best)]
 
 
 def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalForm]:
@@ -144,7 +144,7 @@ def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Pla
     pair: Plane | None = None
     for packing in packings:
         system = System.of(packing)
-        pair = pair.at(system) if pair else pair_about(_modes_near(system, eigenvalue), eigenvalue)
+        pair = pair.at(system) if pair else Plane.about(_modes_near(system, eigenvalue), eigenvalue)
         yield pair
 
 
@@ -154,9 +154,3 @@ def _modes_near(system: System, value: float) -> Motions:
         if len(system.active) > DENSE:
             return Motions.near(system, [(value, 12)])
     return Motions.of(system)
-
-
-def _plane(vectors: Complexes) -> Floats:
-    """Orthonormal real basis, shape (n, 2), of the plane of two real or two complex conjugate vectors."""
-    both = np.hstack([vectors.real, vectors.imag])
-    return np.asarray(np.linalg.svd(both, full_matrices=False)[0][:, :2])

@@ -13,8 +13,6 @@ thousandth (packings of 40 and 100 disks, dashpots from 0.01 to 10). In a stable
 or come close to a neighbour between two loads. All motions but these, and their neighbours, go on losing energy.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
@@ -34,16 +32,9 @@ MOST = 24
 
 
 class Quiet:
-    """The few motions that may grow between two loads, at both.
+    """The few motions that may grow between two loads, at both."""
 
-    Parameters
-    ----------
-    undamped : callable
-        System without dissipation -> all of its motions.
-    """
-
-    def __init__(self, undamped: Callable[[System], Motions]) -> None:
-        self._undamped = undamped
+    def __init__(self) -> None:
         self.crowded = False  # whether dashpots mix a third of all motions beyond the second order
         self._known: dict[float, tuple[Complexes, NDArray[np.bool_], Motions]] = {}
 
@@ -81,7 +72,7 @@ class Quiet:
         """lambda of all motions without dissipation, by real part, and which of them may grow."""
         if system.fx in self._known:
             return self._known[system.fx]
-        state = self._undamped(System(system.fx, system.stiffness))
+        state = Motions.of(System(system.fx, system.stiffness))
         values, x, y = state.with_conjugates()
         if not np.any(values.imag):
             x, y = x.real, y.real

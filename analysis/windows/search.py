@@ -162,7 +162,9 @@ class Search:
                 self.growing = [(below.values[k], _edge_at(below, k, here.fx, 0.0)) for k in begun]
             if few and len(self.growing) != below.grows.sum():
                 below, above = self._motions(here, there)
-            same, begins, ends = self._changes(below, above)
+            drifts = below.slopes(there), above.slopes(here)
+            changes = self._changes_of_pairs if here.damping is None else self._changes_of_motions
+            same, begins, ends = changes((below, above), drifts)
         except DoubtError as doubt:
             if span > self.narrowest:
                 fx = doubt.args[0] if doubt.args else here.fx + 0.47 * span
@@ -190,14 +192,11 @@ class Search:
         self._before = here
         self._known = {fx: each for fx, each in self._known.items() if fx >= there.fx}
 
-    def _changes(self, below: Motions, above: Motions) -> Changes:
-        """What happens between two loads; a DoubtError if that is not sure."""
-        drifts = below.slopes(above.system), above.slopes(below.system)
-        kind = self._changes_of_pairs if below.system.damping is None else self._changes_of_motions
-        return kind((below, above), drifts)
-
     def _changes_of_pairs(self, states: tuple[Motions, Motions], drifts: Sequence[Complexes]) -> Changes:
-        """As `_changes`, without dissipation: what changes is real at one load and a complex pair at the other."""
+        """What happens between two loads without dissipation; a DoubtError if that is not sure.
+
+        What changes is real at one load and a complex pair at the other.
+        """
         (below, above), span = states, states[1].system.fx - states[0].system.fx
         same, begun, ended = recognised(below, above, ALIKE)
         if len(begun) + len(ended) > 1:
@@ -235,10 +234,9 @@ class Search:
             self._look_inside(self._track(states, drifts, levels[0][k : k + 2], levels[1][k : k + 2]), place[k])
         for i, j in same:  # a complex pair may be real in between
             track = self._track(states, drifts, [i], [j])
-            four = (growth for _, v, s in track.points for growth in (growth_of(v), span * growth_of(s)))
-            width, place = lowest(*(np.array([each]) for each in four))
-            if width[0] * span > self.narrowest:
-                self._look_inside(track, place[0])
+            wide, at = lowest(*(growth for _, v, s in track.points for growth in (growth_of(v), span * growth_of(s))))
+            if wide * span > self.narrowest:
+                self._look_inside(track, float(at))
         return same, edges[1], edges[0]
 
     def _track(self, states: Sequence[Motions], drifts: Sequence[Complexes], *members: Any) -> Track:
@@ -289,14 +287,14 @@ class Search:
             # on either side of the edge the growth may change its sign again
             slope = (track.growth(right) - track.growth(left)) / (right - left)
             for (end, numbers, slopes), near in zip(track.points, (left, right), strict=True):
-                sign, step, drift = np.sign(growth_of(numbers)), near - end, growth_of(slopes)
-                four = growth_of(numbers), drift * step, track.growth(near), slope * step
-                if abs(step) * lowest(*(np.array([sign * each]) for each in four))[0][0] > self.narrowest:
+                step, there = near - end, growth_of(numbers)
+                four = there, growth_of(slopes) * step, track.growth(near), slope * step
+                if abs(step) * lowest(*np.sign(there) * np.array(four))[0] > self.narrowest:
                     raise DoubtError
         return track.edge(*change)
 
     def _changes_of_motions(self, states: tuple[Motions, Motions], drifts: Sequence[Complexes]) -> Changes:
-        """As `_changes`, with dissipation."""
+        """What happens between two loads with dissipation; a DoubtError if that is not sure."""
         (below, above), span = states, states[1].system.fx - states[0].system.fx
         alike = below.alike(above) * closeness(below.values, span * drifts[0], above.values, span * drifts[1])
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
@@ -328,7 +326,7 @@ def _edge_at(state: Motions, k: int, fx: float, error: float) -> Edge:
     """The edge of a motion that grows from the start, without an error, or that is not solved for."""
     value = complex(state.values[k])
     value = value if state.system.damping is not None else value.real
-    return Edge(fx, error, value, float(state.overlap[k]), "contact change" if error else "start")
+    return Edge(fx, error, value, "contact change" if error else "start")
 
 
 def recognised(below: Motions, above: Motions, least: float) -> tuple[list[tuple[int, int]], list[int], list[int]]:
@@ -389,11 +387,11 @@ def cubic(a: Any, slope_a: Any, b: Any, slope_b: Any) -> Any:
     return sum(np.multiply.outer(each, shape) for each, shape in parts) - np.multiply.outer(slope_b, t**2 * (1 - t))
 
 
-def lowest(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats, Floats]:
+def lowest(d0: Any, s0: Any, d1: Any, s1: Any) -> tuple[Any, Any]:
     """The widest stretch of 0 < t < 1 on which functions, positive at both ends, may be negative.
 
-    d0, s0 and d1, s1, each of shape (P,), are values and slopes at t = 0 and at t = 1. Returned are the largest
-    possible width in t, zero where a function surely stays positive, and where it is lowest.
+    d0, s0 and d1, s1, numbers or each of shape (P,), are values and slopes at t = 0 and at t = 1. Returned are the
+    largest possible width in t, zero where a function surely stays positive, and where it is lowest.
 
     The lowest point is that of the cubic or of the parabolas through both values and one slope, less the disagreement
     of the three curves and `BEND` of the smaller value.
@@ -403,16 +401,15 @@ def lowest(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats, Floa
     h, k = 3 * (d1 - d0) - 2 * s0 - s1, 2 * (d0 - d1) + s0 + s1
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(h * h - 3 * k * s0, 0.0))
-        t = np.array([-s0 / (2 * f), 1 - s1 / (2 * g), (root - h) / (3 * k)])
+        t = np.array([np.divide(-s0, 2 * f), 1 - np.divide(s1, 2 * g), np.divide(root - h, 3 * k)])
         t = np.clip(np.nan_to_num(t, nan=0.5), 0.0, 1.0)
         r = 1 - t
         curve = d0 + t * (s0 + t * (h + t * k))
         spread = np.maximum(np.abs(d0 + t * (s0 + t * f) - curve), np.abs(d1 - r * (s1 - r * g) - curve))
         low = curve - spread - BEND * np.minimum(d0, d1) * (4 * t * r)
-        deepest = np.argmin(low, axis=0), np.arange(len(d0))
-        depth = np.maximum(-low[deepest], 0.0)
+        deepest, depth = np.argmin(low, axis=0), np.maximum(-low.min(axis=0), 0.0)
         width = np.where(depth > 0, 2 * np.sqrt(depth / np.maximum(np.abs(f), np.abs(g))), 0.0)
-    return np.minimum(width, 1.0), t[deepest]
+    return np.minimum(width, 1.0), np.take_along_axis(t, deepest[None], axis=0)[0]
 
 
 def excursion(a: Any, slope_a: Any, b: Any, slope_b: Any) -> tuple[Floats, Floats]:

@@ -28,7 +28,7 @@ from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csc_array, csr_array
 
 from ..arrays import Floats, Indices
-from ..errors import FaultgougeError, NoEquilibriumError
+from ..errors import NoEquilibriumError
 from ..factors.lanczos import Slice
 from ..progress import report_progress
 from .edges import DoubtError
@@ -50,8 +50,8 @@ from .slices import (
 )
 
 
-class LostPairError(FaultgougeError):
-    """A motion cannot be followed to another load; the text is one sentence."""
+class _LostError(Exception):
+    """A motion cannot be followed to another load."""
 
 
 class SlicedSearch:
@@ -125,39 +125,34 @@ class SlicedSearch:
     ) -> tuple[Window | None, bool]:
         """The first window of the system itself among those announced, and whether it is in doubt.
 
-        On the finest increments the search goes on at a doubt, and raises the error behind it if it finds no window.
+        On the finest increments the search goes on at a doubt, and raises the error behind it if it finds no window. A
+        motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
+        passed.
         """
         off, first, doubt = 2 * self.limits.reach * (there.fx - here.fx), None, False
-        lost: FaultgougeError | None = None
+        places = [there, *(each for each in reversed(self.passed) if each.fx <= here.fx)]
+        missing: NoEquilibriumError | None = None
         for candidate in candidates:
             if first is not None and candidate.onset > first.fx_onset + off:
                 break
             report_progress(f"a motion that may grow from about F_x = {candidate.onset:.6g}: its onset")
+            window: Window | None = None
             try:
-                window = self._confirm(candidate, here, there)
-            except (NoEquilibriumError, LostPairError) as error:
-                window, doubt, lost = None, True, error
+                for above, below in pairwise(places):
+                    window = next(iter(self._windows_near(candidate, below, above)), None)
+                    if window is None or window.kind != "start":
+                        break
+            except (NoEquilibriumError, _LostError) as error:
+                window, doubt = None, True
+                missing = error if isinstance(error, NoEquilibriumError) else missing
             if window is not None and (first is None or window.fx_onset < first.fx_onset):
                 doubt = doubt or (window.fx_onset > here.fx and abs(window.fx_onset - candidate.onset) > off)
                 first = window
             if doubt and not finest:
                 break
-        if finest and first is None and isinstance(lost, NoEquilibriumError):
-            raise lost
+        if finest and first is None and missing is not None:
+            raise missing
         return first, doubt
-
-    def _confirm(self, candidate: Candidate, here: System, there: System) -> Window | None:
-        """The first window of the system itself next to an announced one; None if there is none.
-
-        A motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
-        passed.
-        """
-        places = [*(each for each in self.passed if each.fx <= here.fx), there]
-        for k in range(len(places) - 2, -1, -1):
-            windows = self._windows_near(candidate, places[k], places[k + 1])
-            if not windows or windows[0].kind != "start" or k == 0:
-                return windows[0] if windows else None
-        return None
 
     def _windows_near(self, candidate: Candidate, here: System, there: System) -> Sequence[Window]:
         """The windows of the few motions next to an announced one."""
@@ -174,12 +169,7 @@ class SlicedSearch:
             return below, above
 
         def lost(system: System) -> NoReturn:
-            pair = f"the pair of eigenvalues about {candidate.value.real:.6g}"
-            what = pair if system.damping is None else f"a motion of the frequency {candidate.value.imag:.6g}"
-            raise LostPairError(
-                f"{what} cannot be told from its neighbours between F_x = {here.fx:.10g} and {there.fx:.10g}: take "
-                "smaller increments"
-            )
+            raise _LostError
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
@@ -202,19 +192,12 @@ class SlicedSearch:
             """Those of this rank."""
             found: list[SliceResult] = []
             done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
-            failure: FaultgougeError | None = None
             for basis in self._bases(places[0], stored):
                 done += basis.own.stop - basis.own.start
                 report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
-                try:
-                    found.append(self._search_slice(basis, places))
-                except FaultgougeError as error:
-                    failure = failure or error  # it waits: the ranks meet at the end of their bases
-                    continue
+                found.append(self._search_slice(basis, places))
                 if folder is not None:
                     keep_result(folder, found[-1])
-            if failure is not None:
-                raise failure
             return found
 
         every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
@@ -227,7 +210,7 @@ class SlicedSearch:
         damped = len(blocks[0]) == 2
         if not damped and len(blocks[0][0]) < len(places[0].active):
             blocks = [[_with_larger_feed(block, self.limits.excess)] for (block,) in blocks]
-        quiet, found = Quiet(Motions.of), []
+        quiet, found = Quiet(), []
         own, spacing = basis.values[basis.own], basis.border.spacing
         for k, (here, there) in enumerate(pairwise(places)):
             span = there.fx - here.fx

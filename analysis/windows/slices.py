@@ -14,7 +14,6 @@ damaged file is that of a slice that is searched again.
 
 import hashlib
 import os
-import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -78,16 +77,16 @@ class Ranks:
             The first one that a rank has met, on all ranks; at once one of those that end all ranks (`one_rank`).
         """
         try:
-            mine: tuple[Mine | None, FaultgougeError | None] = work(), None
+            mine: Mine | FaultgougeError = work()
         except FaultgougeError as error:
             if error.one_rank:
                 raise
-            mine = None, error
-        everyone: Sequence[Any] = self.gather(mine)
-        for _, met in everyone:
-            if met is not None:
+            mine = error
+        everyone = self.gather(mine)
+        for met in everyone:
+            if isinstance(met, FaultgougeError):
                 raise met
-        return [each for each, _ in everyone]
+        return everyone
 
 
 ALONE = Ranks()
@@ -253,8 +252,10 @@ def kept_results(folder: Path) -> list[SliceResult]:
         damaged = suppress(OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile)
         with damaged, np.load(path) as data:
             first, stop = (int(number) for number in data["modes"])
-            motions = [(int(k.real), onset.real, inside.real, *rest) for k, onset, inside, *rest in data["motions"]]
-            candidates = [Candidate(k, float(a), float(b), *map(complex, rest)) for k, a, b, *rest in motions]
+            candidates = [
+                Candidate(int(k.real), float(a.real), float(b.real), complex(value), complex(slope))
+                for k, a, b, value, slope in data["motions"]
+            ]
             border = Border((first, stop), *map(float, data["border"]))
             found.append(SliceResult(border, candidates, bool(data["crowded"])))
     return sorted(found, key=lambda each: each.border.modes)
@@ -262,12 +263,10 @@ def kept_results(folder: Path) -> list[SliceResult]:
 
 def results_folder(parent: Path, places: Sequence[System], limits: Limits) -> Path:
     """Make the folder of the results on the increments between some loads; OutputError if that cannot be."""
-    digest = hashlib.sha256(repr((version("faultgouge"), limits)).encode())
-    for place in places:
-        digest.update(repr(place.fx).encode())
-        for matrix in [each for each in (place.stiffness, place.damping) if each is not None]:
-            for array in (matrix.data, matrix.indices, matrix.indptr):
-                digest.update(np.ascontiguousarray(array).data)
+    digest = hashlib.sha256(repr((version("faultgouge"), limits, [place.fx for place in places])).encode())
+    for matrix in (each for place in places for each in (place.stiffness, place.damping) if each is not None):
+        for array in (matrix.data, matrix.indices, matrix.indptr):
+            digest.update(np.ascontiguousarray(array).data)
     folder = parent / digest.hexdigest()[:16]
     make_folder(folder)
     (folder / MARK).touch()
@@ -276,12 +275,11 @@ def results_folder(parent: Path, places: Sequence[System], limits: Limits) -> Pa
 
 def remove_results(parent: Path) -> None:
     """Remove folders of results, which have nothing else in them, and the folder that they are in if it is empty."""
-    for folder in parent.glob("[0-9a-f]" * 16):
-        if (folder / MARK).is_file():
-            for path in folder.iterdir():
-                if path.name in (MARK, "shifts.npz") or re.fullmatch(r"\d+-\d+\.npz|[0-9a-f]{32}\.new", path.name):
-                    path.unlink(missing_ok=True)
-            with suppress(OSError):  # it holds what others have put there
-                folder.rmdir()
+    for mark in parent.glob("[0-9a-f]" * 16 + f"/{MARK}"):
+        for own in (MARK, "shifts.npz", "[0-9]*-[0-9]*.npz", "[0-9a-f]" * 32 + ".new"):
+            for path in mark.parent.glob(own):
+                path.unlink(missing_ok=True)
+        with suppress(OSError):  # it holds what others have put there
+            mark.parent.rmdir()
     with suppress(OSError):
         parent.rmdir()

@@ -88,12 +88,11 @@ class GeneratedPacking(Section):
 
     @model_validator(mode="after")
     def _fits(self) -> "GeneratedPacking":
-        says = f"= {self.top} is more than the {self.disks} disks of the packing: lower it"
-        refuse(self.top > self.disks, "top", says)
-        cutoff, row = 2 * max(self.radii), 2 * self.disks * max(self.radii)
+        refuse(self.top > self.disks, "top", f"= {self.top} is more than all {self.disks} disks: lower it")
+        cutoff = 2 * max(self.radii)
         says = f"= {self.width} is under two cutoffs of one largest diameter, {2 * cutoff}: widen the box"
         refuse(self.periodic and self.width < 2 * cutoff, "width", says)
-        open_ = not self.periodic and (self.top < self.disks or row > self.width)
+        open_ = not self.periodic and (self.top < self.disks or self.disks * cutoff > self.width)
         says = "leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
         refuse(open_, "periodic", f"= false {says}")
         return self
@@ -140,12 +139,11 @@ class StoredPacking(Section):
                 upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
             elif self.top is not None or self.frame is not None:
                 raise BadInputError("a run.h5 is taken as it is, with its first frame: leave top and frame out")
-        except OSError as error:
-            says = f'= "{self.file.name}" cannot be read at {self.file} ({error.strerror}): correct the name'
-            raise refusal_sentence("file", says) from None
-        except (PackingFileError, BadInputError) as error:
-            says = f'= "{self.file.name}" is refused: {str(error).rstrip(".")}'
-            raise refusal_sentence("file", says) from None
+        except (OSError, PackingFileError, BadInputError) as error:
+            cause = getattr(error, "strerror", None)
+            says = f"cannot be read at {self.file} ({cause}): correct the name"
+            says = says if cause else f"is refused: {str(error).rstrip('.')}"
+            raise refusal_sentence("file", f'= "{self.file.name}" {says}') from None
         return self
 
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:
@@ -166,10 +164,7 @@ class StoredPacking(Section):
     @property
     def disks(self) -> int:
         """Number of disks."""
-        if not is_hdf5(self.file):
-            return len(read_disks(self.file, self.frame))
-        with RunFile(self.file) as run:
-            return len(run.packing(0)) if len(run) else 0
+        return len(self.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0)))
 
 
 def _kind(section: Any) -> str:

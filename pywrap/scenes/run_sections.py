@@ -132,10 +132,8 @@ class Perturb(WithSignal, Inertia):
 
     @model_validator(mode="after")
     def _fits(self) -> "Perturb":
-        of_floor = 'belongs to on = "floor": the signal is the force on the layer otherwise'
-        refuse(self.quantity and self.on != "floor", "quantity", of_floor)
-        no_frequency = "is missing: an amplitude needs the frequency of its forcing"
-        refuse(self.amplitude > 0 and self.omega is None, "omega", no_frequency)
+        refuse(self.quantity and self.on != "floor", "quantity", 'belongs to on = "floor", whose motion it is')
+        refuse(self.amplitude > 0 and self.omega is None, "omega", "is missing: an amplitude needs its frequency")
         return self
 
     @property
@@ -237,12 +235,9 @@ class Drive(WithSignal):
         refuse(both, "velocity", "or drive.protocol says how the far end of the spring moves: give one of the two")
         moves = "protocol" if self.protocol else "velocity"
         refuse(self.fastest == 0, moves, "moves nothing: give a velocity other than 0")
-        no_end = "is missing: give the length of the run, or drive.slips, after which it ends"
-        if rigid:
-            no_end = "is missing: a rigid drive counts no slips, and needs the length of the run"
+        no_end = f"is missing: give the length of the run{'' if rigid else ', or drive.slips, after which it ends'}"
         refuse(self.until is self.protocol is None and (rigid or self.slips is None), "until", no_end)
-        no_spring = "needs a spring: a rigid drive moves the layer at its velocity, and counts no slips"
-        refuse(rigid and self.slips is not None, "slips", no_spring)
+        refuse(rigid and self.slips is not None, "slips", "needs a spring: a rigid drive counts no slips")
         return self
 
     @property

@@ -143,8 +143,7 @@ class Scene(Section):
         overlap = float(repulsion.overlap_of_force(fy))
         stiffness = float(repulsion.normal_stiffness(overlap))
         if perturb is not None:
-            missing = "is missing: give it, or a section [ramp] in which the onset is sought"
-            refuse(perturb.fx is ramp is None, "perturb.fx", missing)
+            refuse(perturb.fx is ramp is None, "perturb.fx", "is missing: give it, or [ramp], to seek the onset")
             lightest = min(1.0, self.inertia_factor) * (getattr(packing, "mass", None) or 1.0)
             steps = perturb.time / (perturb.time_step or 0.1 * math.sqrt(lightest / (6 * stiffness)))
             says = f"= {perturb.time:g} takes {steps:.2g} time steps, a year and more: lower it, or raise the time_step"
@@ -158,24 +157,20 @@ class Scene(Section):
                 refuse(last >= packing.disks, "perturb.target", says)
         if isinstance(packing, GeneratedPacking):
             smallest, rounding = min(packing.radii), DOUBLE_ROUNDING * packing.width * stiffness / fy
-            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius "
-            says += f"{smallest:g}, where the contact law does not hold: lower it, or raise law.kn = {kn:g}"
-            refuse(not overlap < smallest, "load.fy", says)
-            says = f"= {kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of "
-            says += "F_y, and no packing comes to rest: lower it or packing.width, or raise load.fy"
-            refuse(not rounding < ROUNDING_LIMIT, "law.kn", says)
-        if self.damping and ramp:
-            says = "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no "
-            says += 'use for it: set ramp.method = "newton", or leave [damping] out'
-            refuse(ramp.method == "overdamped", "damping", says)
+            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, beyond the smallest radius {smallest:g}"
+            refuse(not overlap < smallest, "load.fy", f"{says}: lower it, or raise law.kn = {kn:g}")
+            says = f"= {kn:g} is too stiff for load.fy = {fy:g}: the last digit of coordinates is {rounding:.1g} of F_y"
+            rests = "and no packing comes to rest: lower it or packing.width, or raise load.fy"
+            refuse(not rounding < ROUNDING_LIMIT, "law.kn", f"{says}, {rests}")
+        says = 'acts in dynamics, and no equilibrium depends on it: set ramp.method = "newton", or leave [damping] out'
+        refuse(self.damping and ramp and ramp.method == "overdamped", "damping", says)
         if (drive := self.drive) is not None:
             strength, at = self.law.mus[0] * fy, drive.at or 0.0
             refuse(strength == 0, "drive", "needs friction, which holds the layer: give law.mu a value above 0")
             end = drive.length(strength) if drive.at is not None else math.inf
             refuse(at >= end, "drive.at", f"= {at} is after the end of the run, {end:g}: let the signal begin before")
-            slowed = drive.spring == "rigid" and self.damping and self.damping.tau is not None
             says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
-            refuse(slowed, "damping.tau", says)
+            refuse(drive.spring == "rigid" and self.damping and self.damping.tau, "damping.tau", says)
         real_units(self)
         return self
 

@@ -82,8 +82,7 @@ class Law(Section):
 
     @model_validator(mode="after")
     def _known(self) -> "Law":
-        unknown = self.exponent not in EXPONENTS
-        refuse(unknown, "exponent", f"= {self.exponent:g} is refused: give {known_exponents()}")
+        refuse(self.exponent not in EXPONENTS, "exponent", f"= {self.exponent:g} is refused: give {known_exponents()}")
         flat = self.history == "rescaled" and self.exponent < LEAST_RESCALED
         refuse(flat, "history", f'= "rescaled" needs a law.exponent of {LEAST_RESCALED} or more')
         return self
@@ -117,8 +116,7 @@ class Damping(Section):
 
     @model_validator(mode="after")
     def _not_empty(self) -> "Damping":
-        empty = not self.model_fields_set
-        refuse(empty, "", "has nothing in it: give cn, ct or tau, or leave the section out")
+        refuse(not self.model_fields_set, "", "has nothing in it: give cn, ct or tau, or leave the section out")
         return self
 
 
@@ -177,8 +175,7 @@ class Ramp(Section):
     def _turning_points(cls, until: float | tuple[float, ...]) -> float | tuple[float, ...]:
         points = until if isinstance(until, tuple) else (until,)
         for here, there in pairwise((0.0, *points)):
-            says = f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round"
-            refuse(here == there, "", says)
+            refuse(here == there, "", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
         return points if len(points) > 1 else points[0]
 
     @model_validator(mode="after")
@@ -235,8 +232,8 @@ class Friction(Section):
         if isinstance(v_ss, str):
             advice = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
             refuse(not multiple_of("v0", 1.0, v_ss), "", f"= {v_ss!r} is refused: {advice}")
-            standing = info.data.get("v0") == 0
-            refuse(standing, "", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
+            says = f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0'
+            refuse(info.data.get("v0") == 0, "", says)
         return v_ss
 
     def velocity_scale(self, v0: float) -> float:

@@ -100,9 +100,9 @@ class Units(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Units:
-        key = "impact_velocity" if self.impact_velocity is None else "restitution"
-        alone = (self.restitution is None) != (self.impact_velocity is None)
-        refuse(alone, key, "is missing: the restitution depends on the velocity, so give both")
+        for key, other in (("impact_velocity", self.restitution), ("restitution", self.impact_velocity)):
+            alone = other is not None and getattr(self, key) is None
+            refuse(alone, key, "is missing: the restitution depends on the velocity, so give both")
         return self
 
     def si(self, key: str) -> float:
@@ -203,8 +203,8 @@ class Grains(BaseModel):
             return packing
         units, radii = info.data["units"], packing.get("radii", GeneratedPacking.model_fields["radii"].default)
         numbers = [each for each in radii if is_number(each) and each > 0] if isinstance(radii, (list, tuple)) else []
-        mixed = numbers and any(isinstance(each, str) for each in radii)
-        refuse(mixed, "radii", "has numbers beside quantities: give all of them a unit, or none")
+        says = "has numbers beside quantities: give all of them a unit, or none"
+        refuse(numbers and any(isinstance(each, str) for each in radii), "radii", says)
         length = units.si("grain_diameter") / (2 * min(numbers, default=0.5))
         assert info.context is not None
         info.context["units"] = SimpleNamespace(length=length, mass=units.grain_mass, time=math.nan)
@@ -275,8 +275,8 @@ def units_of(
     units: Units, section: GeneratedPacking | StoredPacking, exponent: float, kn: float | None, fy: float
 ) -> RealUnits:
     """The units of a scene with this packing, law and load; without k_n that of grains of diameter and mass one."""
-    no_moduli = f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out"
-    refuse(exponent != HERTZ_EXPONENT, "units", no_moduli)
+    says = f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out"
+    refuse(exponent != HERTZ_EXPONENT, "units", says)
     if isinstance(section, GeneratedPacking):
         diameter, mass, top = 2 * min(section.radii), section.mass or 1.0, section.top
         width = section.width if section.periodic else None

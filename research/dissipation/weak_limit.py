@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Floats, NoEquilibriumError, Packing, Window, damping_matrix, mass_weighted
 from faultgouge.analysis.windows import Motions, System, force_bearing
-from faultgouge.analysis.windows.pair_over_load import Plane, pair_about
+from faultgouge.analysis.windows.pair_over_load import Plane
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""
@@ -186,7 +186,7 @@ def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Cal
     def system(fx: float) -> System:
         return System.of(equilibrium(fx))
 
-    known = {window.fx_onset: pair_about(Motions.of(system(window.fx_onset)), window.eigenvalue)}
+    known = {window.fx_onset: Plane.about(Motions.of(system(window.fx_onset)), window.eigenvalue)}
 
     def at(fx: float) -> Plane:
         if fx not in known:

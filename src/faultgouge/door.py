@@ -145,14 +145,12 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
     """
 
     def __init__(self, file: str | Path) -> None:
-        self.path = path_of(file, "frames")
+        self.path, self._count = path_of(file, "frames"), 1
         if self.path.suffix == ".disks":
             self._count = sum(1 for _ in dump_frames(self.path))
         elif self.path.suffix == ".h5" and not holds_configuration(self.path):
             with RunFile(self.path) as run:
                 self._count = len(run)
-        else:
-            self._count = 1
 
     def __len__(self) -> int:
         return self._count

@@ -4,9 +4,13 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, eye_array
 
+from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
+
 
 def turned(blocks, rng):
-    """A sparse matrix with the eigenvalues of small blocks on the diagonal, turned by rotations of random planes."""
+    """A sparse matrix with the eigenvalues of numbers and small blocks on the diagonal, turned by rotations of random
+    planes."""
     matrix = csr_array(block_diag(*blocks))
     size = matrix.shape[0]
     for _ in range(3):
@@ -23,3 +27,16 @@ def turned(blocks, rng):
 
 def complex_block(real, imaginary):
     return np.array([[real, imaginary], [-imaginary, real]])
+
+
+def of_stiffness(matrix, damping=None):
+    """Disks of unit masses with this K and C, whose contacts are not known."""
+    count = matrix.shape[0] // 3
+    each, kinds = np.ones(count), dict.fromkeys(PER_CONTACT, float) | dict.fromkeys("ij", int)
+    kinds |= dict.fromkeys(BOOLEAN, bool)
+    contacts = LinearisedContacts(**{name: np.zeros((0, *shape), kinds[name]) for name, shape in PER_CONTACT.items()})
+    return Configuration(
+        dimension=2, position=np.zeros((count, 2)), radius=each, mass=each, inertia=each, contacts=contacts,
+        box=np.eye(3), origin=np.zeros(3), periodic=np.zeros(3, bool), load=np.zeros((count, 2, 3)), stiffness=matrix,
+        damping=csr_array(matrix.shape) if damping is None else damping,
+    )  # fmt: skip

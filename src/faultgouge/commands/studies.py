@@ -139,10 +139,8 @@ def extremes(
     result = try_all(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result["cases"])
     yield result
-    yield (
-        f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
-        f"{counts['fails']} fail; written: {output}/extremes.md"
-    )
+    of = f"{counts['holds']} hold, {counts['refused']} are refused in a sentence, {counts['fails']} fail"
+    yield f"{counts.total()} cases: {of}; written: {output}/extremes.md"
     check(result)
 
 

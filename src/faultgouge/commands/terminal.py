@@ -18,13 +18,13 @@ from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
 
 import typer
 from typer import Argument, Option
 from typer.models import CommandInfo
 
-from ..signal_guard import holds, is_root, keeps
+from ..signal_guard import is_root, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -103,7 +103,7 @@ def command(
     """
 
     def register(work: Callable[P, Results]) -> Callable[P, Results]:
-        own = inspect.signature(work)
+        own = inspect.signature(work, eval_str=True)
 
         @wraps(work)
         def run(as_json: bool = False, **given: Any) -> None:
@@ -127,11 +127,8 @@ def command(
                         print_line(json.dumps({FORMAT_KEY: FORMAT, **result}, indent=1))
                         speak = say
 
-        hints = get_type_hints(work, include_extras=True)
-        parameters = [each.replace(annotation=hints[key]) for key, each in own.parameters.items()]
-        if as_json:
-            flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
-            parameters.append(flag)
+        flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
+        parameters = [*own.parameters.values(), *([flag] if as_json else [])]
         vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
         run.__annotations__ = {each.name: each.annotation for each in parameters}
         called, help_ = work.__name__.rstrip("_"), inspect.getdoc(work) or ""
@@ -160,7 +157,7 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
     Of the kind "new" it is not there yet; a "run" takes its lock itself; a "folder" is made. A table of the program
     begins with `head`.
     """
-    from faultgouge.analysis.files.atomic_write import check_output, lock_of, lock_output, make_folder
+    from faultgouge.analysis.files.atomic_write import check_output, lock_output, make_folder
 
     if kind == "new" and output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -171,8 +168,6 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
         return
     if kind == "folder":
         make_folder(output)
-    if lock := lock_of(output):
-        holds(lock)  # the guard removes the lock of a work that cannot do so itself
     with nullcontext() if kind == "run" else lock_output(output):
         yield
 

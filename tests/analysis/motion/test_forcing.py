@@ -5,10 +5,11 @@ import pytest
 from linearised import dissipative, matrices
 
 from faultgouge.analysis.responses.response import floor_force, impulse_response, layer_force, linear_response
-from faultgouge.analysis.responses.signals import Signal, SignalError, pulse, sweep
+from faultgouge.analysis.responses.signals import Signal, SignalError, pulse
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408
+NEAR = np.linspace(-3e-3, 3e-3, 601)
 
 
 @pytest.fixture(scope="module", params=[{}, {"cn": 10.0, "ct": 5.0, "drag_time": 20.0}], ids=["undamped", "damped"])
@@ -36,22 +37,14 @@ def test_impulse_response_gives_velocity_and_transfer_function(packing):
 
 
 def test_largest_velocity_is_that_of_a_fine_sampling(packing):
+    """Samples of half a period of the fastest mode find no larger one, and a thousandth of it finds the same."""
     response = impulse_response(packing, layer_force(packing, 1.0))
     omegas = np.array([0.3, 14.2, 120.0])
-    found, when = response.largest(omegas, 10.0)
-    for omega, velocity, time in zip(omegas, found, when, strict=True):
-        sampled = np.abs(_velocities(response, omega, 10.0, 448))
-        # between samples a 600th of the fastest period apart, the velocity rises by less than 1e-5
-        assert velocity == pytest.approx(sampled.max(), rel=1e-5)
+    for omega, velocity, time in zip(omegas, *response.largest(omegas, 10.0), strict=True):
+        every, near = (np.abs(response.velocity(omega, t)) for t in (np.linspace(0, 10, 4001), time + NEAR))
+        assert 0.98 * velocity < every.max() <= velocity * (1 + 1e-9)
+        assert near.max() == pytest.approx(velocity, rel=1e-5)
         assert abs(response.velocity(omega, [time])[0]) == pytest.approx(velocity, rel=1e-12)
-
-
-def _velocities(response, omega, duration, count):
-    """v at count^2 times, from exponentials of `count` long steps and as many short ones."""
-    long, short = duration / count * np.arange(count), duration / count**2 * np.arange(count)
-    rate, part = response.rate, response.weight / (1j * omega - response.rate)
-    rate, part = np.append(rate, 1j * omega), np.append(-part, part.sum())
-    return np.real((np.exp(np.multiply.outer(long, rate)) * part) @ np.exp(np.multiply.outer(rate, short)))
 
 
 def test_moving_floor_is_a_force_on_every_disk(packing):
@@ -73,18 +66,13 @@ def test_signal_is_zero_outside_and_straight_between():
     assert signal.shortest == 1.0
 
 
-def test_pulse_peaks_where_it_says_and_sweep_goes_from_one_frequency_to_the_other():
+def test_pulse_peaks_where_it_says():
     wave = pulse(3.0)
     step = wave.time[1] - wave.time[0]
     frequency = 2 * np.pi * np.fft.rfftfreq(1 << 16, step)
     assert frequency[np.abs(np.fft.rfft(wave.value, 1 << 16)).argmax()] == pytest.approx(3.0, rel=1e-2)
     assert abs(wave.value[0]) < 1e-8
     assert wave.value.max() == pytest.approx(1.0, rel=2e-4)  # the peak lies between two rows
-    wave = sweep(2.0, 6.0, 50.0)
-    zeros = wave.time[1:][np.diff(np.sign(wave.value)) != 0]
-    half_periods = np.pi / np.diff(zeros)
-    assert half_periods[1] == pytest.approx(2.0, rel=0.1)
-    assert half_periods[-1] == pytest.approx(6.0, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def random_packing(seed):
     Some have drag, no tangential dashpots, springs that push apart, or lever arms that differ; some nothing that holds
     them, so that they drift."""
     rng = np.random.default_rng(seed)
-    side = int(rng.integers(5, 9))
+    side = int(rng.integers(4, 8))
     place = np.stack(np.meshgrid(*[np.arange(side)] * 2), -1).reshape(-1, 2) + rng.uniform(-0.25, 0.25, (side**2, 2))
     pairs = cKDTree(place).query_pairs(1.35, output_type="ndarray")
     i, j = pairs[rng.random(len(pairs)) < 0.9].T
@@ -89,6 +89,14 @@ def test_certificate_against_lapack_on_random_packings(first):
     assert proofs >= 5
 
 
+def test_a_certificate_bounds_fast_motions_that_decay_more_slowly_than_the_slow_ones():
+    """Lone oscillators, of which the fastest has the weakest dashpot: the error reaches up to 2 Re s of that one."""
+    frequency, dashpot = np.linspace(1.0, 10.0, 200), np.linspace(0.3, 0.1, 200)
+    found = prove(csr_array(np.diag(frequency**2)), csr_array(np.diag(dashpot)), 0.0)
+    assert found.stable
+    assert found.growth_rate + found.error >= -0.1 > found.growth_rate + 0.5 * found.error
+
+
 @pytest.fixture
 def beyond_lapack(monkeypatch):
     """As if LAPACK served no packing."""
@@ -98,62 +106,49 @@ def beyond_lapack(monkeypatch):
 
 def row_of_spheres(count, pressed=2.0, dashpot=40.0):
     """Equal spheres side by side on a plane, between two walls that press them together; apart if `pressed` is 0."""
-    first, others = np.arange(count), np.arange(count - 1)
-    i = np.concatenate([others + 1, first, [0, count - 1]])
-    j = np.concatenate([others, np.full(count + 2, -1)])
-    pair, size = j >= 0, len(i)
-    normal = np.zeros((size, 3))
-    normal[pair, 0] = 1.0
+    first = np.arange(count)
+    i, j = np.r_[first[1:], first, 0, count - 1], np.r_[first[:-1], np.full(count + 2, -1)]
+    normal = np.zeros((len(i), 3))
+    normal[: count - 1, 0] = 1.0
     normal[count - 1 : -2, 2] = 1.0
-    normal[-2, 0], normal[-1, 0] = 1.0, -1.0
-    force = np.where(np.abs(normal[:, 0]) > 0, pressed, 1.0)
+    normal[-2:, 0] = 1.0, -1.0
+    force, none, ones = np.where(normal[:, 0] == 0, 1.0, pressed), np.zeros((len(i), 3)), np.ones(len(i))
     load = np.zeros((count, 2, 3))
     load[:, 0, 2] = -1.0
-    none, ones = np.zeros((size, 3)), np.ones((size, 2))
     contacts = LinearisedContacts(
-        i=i, j=j, normal=normal, distance=np.where(pair, 1.0, np.inf), overlap=np.full(size, 1e-3),
-        slip_arm=0.5 * ones, lever_arm=0.5 * ones, lever_slope=np.zeros(size),
-        normal_force=force, tangential_force=none,
-        normal_stiffness=np.full(size, 3e3), tangential_stiffness=np.full(size, 2e3), closing=none, parting=none,
-        normal_dashpot=np.full(size, dashpot), tangential_dashpot=np.full(size, 0.5 * dashpot),
+        i=i, j=j, normal=normal, distance=np.where(j >= 0, 1.0, np.inf), overlap=1e-3 * ones,
+        slip_arm=np.full((len(i), 2), 0.5), lever_arm=np.full((len(i), 2), 0.5), lever_slope=0 * ones,
+        normal_force=force, tangential_force=none, normal_stiffness=3e3 * ones, tangential_stiffness=2e3 * ones,
+        closing=none, parting=none, normal_dashpot=dashpot * ones, tangential_dashpot=0.5 * dashpot * ones,
         friction=0.5 * force,
     )  # fmt: skip
-    place = np.column_stack([first, 0 * first, 0.5 + 0 * first])
     each = np.ones(count)
-    contacts = contacts.chosen(force > 0)
     return Configuration(
-        dimension=3, position=place, radius=0.5 * each, mass=each, inertia=0.1 * each, contacts=contacts,
-        box=np.diag([count, 1.0, 1.0]), origin=np.array([-0.5, -0.5, 0.0]), periodic=np.zeros(3, bool), load=load,
+        dimension=3, position=np.column_stack([first, 0 * first, 0.5 * each]), radius=0.5 * each, mass=each,
+        inertia=0.1 * each, contacts=contacts.chosen(force > 0), box=np.diag([count, 1.0, 1.0]),
+        origin=np.array([-0.5, -0.5, 0.0]), periodic=np.zeros(3, bool), load=load,
     )  # fmt: skip
 
 
 def turned_row(row):
     """The row, and its load, in another direction, so that no number that should be zero is zero to the bit."""
-    q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    q = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
     contacts = derive_frozen(row.contacts, normal=row.contacts.normal @ q)
     return derive_frozen(row, contacts=contacts, load=row.load @ q)
 
 
 def with_more(row, contacts, place, load):
     """A packing with more contacts, each the first one but for what is given, and more particles, each the first."""
-    c, count = row.contacts, len(place)
-    new = len(contacts["i"])
-    more = {name: np.repeat(getattr(c, name)[:1], new, axis=0) for name in PER_CONTACT} | contacts
-    joined = {name: np.concatenate([getattr(c, name), more[name]]) for name in PER_CONTACT}
-    names = ("radius", "mass", "inertia")
-    each = {name: np.concatenate([getattr(row, name), getattr(row, name)[:1].repeat(count)]) for name in names}
+    c, count = row.contacts, len(contacts["i"])
+    joined = {
+        name: np.concatenate([getattr(c, name), contacts.get(name, np.repeat(getattr(c, name)[:1], count, axis=0))])
+        for name in PER_CONTACT
+    }
+    each = {name: np.pad(getattr(row, name), (0, len(place)), "edge") for name in ("radius", "mass", "inertia")}
     return Configuration(
         dimension=row.dimension, position=np.vstack([row.position, place]), contacts=LinearisedContacts(**joined),
         box=row.box, origin=row.origin, periodic=row.periodic, load=np.concatenate([row.load, load]), **each,
     )  # fmt: skip
-
-
-def with_a_pair_out_of_balance(row, force):
-    """A row on a plane, and two spheres beside it that push each other apart a little, and turn round each other."""
-    count = len(row)
-    pair = {"i": [count + 1], "j": [count], "normal_force": [force], "friction": [0.5 * force]}
-    pair |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
-    return with_more(row, pair, np.add(row.position[:2], [0.0, 5.0, 0.0]), np.zeros((2, 2, 3)))
 
 
 STRONG, WEAK, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
@@ -172,22 +167,18 @@ def test_rate_of_a_packing_beyond_lapack_is_that_of_lapack(reference_packing, re
     assert found.free == expected.free
 
 
-def with_disks_alone(packing, count):
-    """A packing of disks, and equal disks on a wall, none of which touches another."""
+def test_many_particles_alone_with_the_same_eigenvalues_hide_none(reference_packing, beyond_lapack):
+    """Two hundred disks on a wall, none of which touches another: more equal eigenvalues than six vectors see."""
+    packing, count = dissipative(reference_packing(1.0), *WEAK).configuration, 200
     alone = {"i": len(packing) + np.arange(count), "j": np.full(count, -1), "distance": np.full(count, np.inf)}
     alone |= {"normal": np.tile([0.0, 1.0, 0.0], (count, 1)), "tangential_force": np.zeros((count, 3))}
     load = np.zeros((count, 2, 3))
     load[:, 0, 1] = -packing.contacts.normal_force[0]
-    return with_more(packing, alone, packing.position[:1].repeat(count, 0), load)
-
-
-def test_many_particles_alone_with_the_same_eigenvalues_hide_none(reference_packing, beyond_lapack):
-    """Two hundred eigenvalues in one place are more than a block of six vectors sees."""
-    packing = dissipative(reference_packing(1.0), *WEAK).configuration
-    alone, found = (linear_verdict(Motion.of(each)) for each in (packing, with_disks_alone(packing, 200)))
-    assert found.stable is alone.stable is True
-    assert found.free == alone.free + 200  # these roll
-    assert found.growth_rate == pytest.approx(alone.growth_rate, abs=found.error + alone.error)
+    both = packing, with_more(packing, alone, packing.position[:1].repeat(count, 0), load)
+    expected, found = (linear_verdict(Motion.of(each)) for each in both)
+    assert found.stable is expected.stable is True
+    assert found.free == expected.free + count  # these roll
+    assert found.growth_rate == pytest.approx(expected.growth_rate, abs=found.error + expected.error)
     assert found.said.startswith("no motion faster than")
 
 
@@ -215,12 +206,16 @@ def test_motions_that_no_force_opposes_are_counted_and_no_growth(row, stable, fr
 
 
 def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
-    """1e-9 of the forces leaves it an eigenvalue of A below zero, and s next to the root of that."""
-    row = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-9)
-    balanced = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-16)
-    expected, found = linear_verdict(Motion.of(balanced)), linear_verdict(Motion.of(row))
-    assert row.residual == pytest.approx(1e-9)
-    assert 1e-6 < np.linalg.eigvals(Motion.of(row).first_order).real.max() < 1e-4
+    """Two spheres beside three on a plane push each other apart by 1e-9 of the forces, and turn round each other: this
+    motion has an eigenvalue of A below zero, and s next to the root of that."""
+    row, made = row_of_spheres(3, 0.0), []
+    for force in (1e-9, 1e-16):
+        pair = {"i": [4], "j": [3], "normal_force": [force], "friction": [0.5 * force]}
+        pair |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
+        made.append(with_more(row, pair, np.add(row.position[:2], [0.0, 5.0, 0.0]), np.zeros((2, 2, 3))))
+    found, expected = (linear_verdict(Motion.of(each)) for each in made)
+    assert made[0].residual == pytest.approx(1e-9)
+    assert 1e-6 < np.linalg.eigvals(Motion.of(made[0]).first_order).real.max() < 1e-4
     assert found.stable
     assert found.free == expected.free > 6
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
@@ -256,22 +251,21 @@ def test_the_slowest_motions_are_those_of_lapack_and_others_stay_in_a_state():
         found = slow_motions(a, g, csr_array(np.eye(size)), top, drifts)
         if found is None:
             continue
-        times += 1
-        for each, error in zip(found.s, found.error, strict=True):
+        times, (values, errors, leave) = times + 1, found
+        for each, error in zip(values, errors, strict=True):
             assert np.abs(s - each).min() <= error + 1e-11 * top
-        known = 2 * drifts + len(found.s)
+        known = 2 * drifts + len(values)
         if not drifts:  # of a double zero LAPACK has no vectors
             vectors = vectors[:, np.argsort(np.abs(s - 0.1 * top))].real
-            np.testing.assert_allclose(found.leave(vectors[:, :known]), 0, atol=4e-5)
-            np.testing.assert_allclose(found.leave(vectors[:, known:]), vectors[:, known:], atol=4e-5)
-    assert times >= 8
+            np.testing.assert_allclose(leave(vectors[:, :known]), 0, atol=4e-5)
+            np.testing.assert_allclose(leave(vectors[:, known:]), vectors[:, known:], atol=4e-5)
+    assert times >= 5
 
 
-def made_up(growing):
+def made_up(growing, count=150):
     """The motion of a known matrix, with a loss in proportion to it, and its largest 2 Re s."""
     rng = np.random.default_rng(4)
-    values = [np.array([[value]]) for value in rng.uniform(0.5, 100, 150)]
-    matrix = turned_blocks([*values, complex_block(40.0, growing)], rng)
+    matrix = turned_blocks([*rng.uniform(0.5, 100, count), complex_block(40.0, growing)], rng)
     size, damping = matrix.shape[0], csr_array(2e-2 * (matrix + matrix.T))
     motion = Motion(row_of_spheres(40), np.arange(size), np.ones(size), csr_array(matrix), damping)
     return motion, 2 * all_values(matrix, damping).real.max()
@@ -289,13 +283,14 @@ def test_a_random_state_falls_or_grows_as_the_slowest_motion(growing):
 
 def test_common_motion_and_motion_that_nothing_opposes_are_left_out_together():
     """Their vectors are not orthogonal: to leave out one after the other would bring the first in again."""
-    motion, expected = made_up(0.1)
-    size, y = len(motion.active) + 2, np.random.default_rng(5).standard_normal((len(motion.active) + 2, 1))
+    motion, expected = made_up(0.1, 60)
+    size = len(motion.active) + 2
+    y = np.random.default_rng(5).standard_normal((size, 1))
     common = np.where(np.arange(size) < len(motion.configuration), 1.0, 0.0)[:, None]
     others = null_space(np.hstack([y, common]).T)
     a, g = (csr_array(others @ matrix @ others.T) for matrix in (motion.stiffness.toarray(), motion.damping.toarray()))
     widened = Motion(motion.configuration, np.arange(size), np.ones(size), a, g)
-    found = follow_decay(widened, csr_array(null_space(y.T)), "", work=1e11)
+    found = follow_decay(widened, csr_array(null_space(y.T)), "", work=3e10)
     assert found.stable
     assert found.free == 2
     assert found.growth_rate == pytest.approx(expected, rel=0.1)
@@ -304,8 +299,7 @@ def test_common_motion_and_motion_that_nothing_opposes_are_left_out_together():
 def operator(seed, growing):
     """150 real eigenvalues and some that grow, sparse."""
     rng = np.random.default_rng(seed)
-    blocks = [np.array([[value]]) for value in rng.uniform(0.5, 100, 150)]
-    return turned_blocks([*blocks, *growing], rng)
+    return turned_blocks([*rng.uniform(0.5, 100, 150), *growing], rng)
 
 
 @pytest.mark.parametrize("seed", [2, 3])
@@ -326,10 +320,14 @@ def test_fastest_growing_motion(seed, damped):
 @pytest.mark.parametrize("strong", [0.5, 40.0])
 def test_strong_dissipation(strong):
     """A loss of many times the largest frequency: the sum does not lose its digits, and a negative eigenvalue grows."""
-    matrix = operator(4, [np.array([[-25.0]])])
+    matrix = operator(4, [-25.0])
     found = fastest_growing(matrix, csr_array(strong * diags_array(np.ones(matrix.shape[0]))), periods=(3, 10))
     # s^2 + c s - 25 = 0
     assert found.growth_rate == pytest.approx(-strong + np.sqrt(strong**2 + 100), rel=1e-6)
+    with pytest.raises(BadInputError, match="100 to 10 periods"):
+        fastest_growing(matrix, periods=(100.0, 10.0))
+    with pytest.raises(BadInputError, match="4 coordinates"):
+        fastest_growing(csr_array(np.eye(4)), periods=(1.0, 2.0))
 
 
 @pytest.mark.parametrize("damped", [False, True])
@@ -351,11 +349,5 @@ def test_many_that_grow_alike_are_seen_to_grow():
     rate = 2 * abs(np.sqrt(30.0 + 5j).imag)
     # the fastest of the eighty, which are not orthogonal, grows at 1.001 times this rate
     assert 0.95 * rate < found.growth_rate < 1.001 * rate
-
-
-def test_what_is_refused_and_a_rate_that_is_a_bound():
-    for size, periods, says in ((40, (100.0, 10.0), "100 to 10 periods"), (4, (1.0, 2.0), "4 coordinates")):
-        with pytest.raises(BadInputError, match=says):
-            fastest_growing(csr_array(np.eye(size)), periods=periods)
     assert exponential(0.21962, 6) == "D as exp(0.21962 t)"
     assert exponential(39.99, 4, at_least=True) == "D at least as exp(39 t), not known closer"

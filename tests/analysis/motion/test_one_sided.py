@@ -7,16 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linearised import motion_matrix
+from quasistatic import branches, lengths_one, turned
 from scipy.linalg import expm
 from scipy.sparse import csr_array
 from three_disks import three_disks
 
-from faultgouge.analysis import (
-    Motion,
-    one_sided_motion,
-    stability,
-    stiffness_matrix,
-)
+from faultgouge.analysis import Motion, one_sided_motion, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.motion.one_sided import MOTION_STEP, OneSidedSystem
@@ -26,83 +22,66 @@ PUSH = 1e-6
 """Times a velocity of one: displacements of 1e-7 are far below overlaps of 1e-2, and far above rounding."""
 
 
-def integrate(packing, velocity, step, count, rise=None):
+def integrate(packing, velocity, step, count, rise=0.0):
     """Displacements of the disks: velocity Verlet of the law itself, under loads that balance the packing at first."""
-    law, c, n, top = packing.law, packing.contacts, len(packing), np.zeros((3, len(packing)))
-    pair = np.flatnonzero(~c.floor)
-    mass = np.array([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
-    place = np.array([*packing.position.T, np.zeros(n)])  # with u = R theta
-    slip, speed, start = c.slip.copy(), np.array([*velocity.T, np.zeros(n)]), place.copy()
+    law, c, n = packing.law, packing.contacts, len(packing)
+    reach = packing.radius[c.i] + np.where(c.floor, 0.0, packing.radius[c.j])
+    mass = np.outer([1.0, 1.0, packing.inertia_factor], packing.mass).T
+    place, slip, speed = packing.position, c.slip, np.column_stack([velocity, np.zeros(n)])
 
-    def branch(where):
-        x = where[:2, c.i] - np.where(c.floor, 0, where[:2, c.j])
-        x[0, c.floor] = 0.0
-        x[0] -= packing.box_length * np.round(x[0] / packing.box_length)
-        return x
+    def branch(place):
+        between = branches(place, packing.box_length, c.i, c.j)
+        return between, np.linalg.norm(between, axis=1)
 
-    def forces(where, moves, slip):
-        x = branch(where)
-        r = np.hypot(*x)
-        normal, overlap = x / r, packing.radius[c.i] + np.where(c.floor, 0, packing.radius[c.j]) - r
-        tangent = np.array([-normal[1], normal[0]])
-        v = moves[:, c.i] * [[1.0], [1.0], [1.0]] - np.where(c.floor, 0, moves[:, c.j] * [[1.0], [1.0], [-1.0]])
-        rate = np.sum(tangent * v[:2], axis=0) - v[2]
+    def relative(moves):
+        """Along x and y, and how far contacts roll."""
+        other = np.where(c.floor[:, None], 0.0, moves[c.j])
+        return moves[c.i, :2] - other[:, :2], moves[c.i, 2] + other[:, 2]
+
+    def forces(place, speed, slip):
+        between, distance = branch(place)
+        normal, overlap, (moves, rolls) = lengths_one(between), reach - distance, relative(speed)
         power, bound = law.growth(overlap), law.mu * law.kn * overlap * law.growth(overlap)
-        fn = law.kn * overlap * power - law.cn * power * np.sum(normal * v[:2], axis=0)
+        fn = law.kn * overlap * power - law.cn * power * np.sum(normal * moves, axis=1)
+        rate = np.sum(turned(normal) * moves, axis=1) - rolls
         ft = np.clip(-law.kt * power * slip - law.ct * power * rate, -bound, bound)
-        on = np.zeros((3, n))
-        for axis, f in enumerate(fn * normal + ft * tangent):
-            np.add.at(on[axis], c.i, f)
-            np.subtract.at(on[axis], c.j[pair], f[pair])
-        np.subtract.at(on[2], c.i, ft)
-        np.subtract.at(on[2], c.j[pair], ft[pair])
-        return on
+        on, net = np.column_stack([fn[:, None] * normal + ft[:, None] * turned(normal), -ft]), np.zeros((n, 3))
+        np.add.at(net, c.i, on)
+        np.subtract.at(net, c.j[~c.floor], on[~c.floor] * [1.0, 1.0, -1.0])
+        return net
 
     rest = forces(place, 0 * speed, slip)
     force = forces(place, speed, slip) - rest
     for k in range(count):
         speed = speed + 0.5 * step * force / mass
-        before, place = place, place + step * speed
-        a, b = branch(before), branch(place)
-        r0, r1 = np.hypot(*a), np.hypot(*b)
-        middle = 0.5 * (a / r0 + b / r1)
-        d = step * speed
-        rolled = d[2, c.i] + np.where(c.floor, 0, d[2, c.j])
-        between = d[:2, c.i] - np.where(c.floor, 0, d[:2, c.j])
-        gain = -middle[1] * between[0] + middle[0] * between[1] - rolled
-        overlap = packing.radius[c.i] + np.where(c.floor, 0, packing.radius[c.j]) - r1
+        (a, r0), place = branch(place), place + step * speed[:, :2]
+        (b, r1), (moves, rolls) = branch(place), relative(step * speed)
+        middle = turned(0.5 * (a / r0[:, None] + b / r1[:, None]))
+        gain = np.sum(middle * moves, axis=1) - rolls
         if law.rescales:
-            gain = gain - slip / (2 * overlap) * np.maximum(r0 - r1, 0.0)
-        slip = law.clamped(overlap, slip + gain)
-        load = top if rise is None else (k + 1) * step * np.array([*rise.T, np.zeros(n)])
-        force = forces(place, speed, slip) - rest + load
+            gain = gain - slip / (2 * (reach - r1)) * np.maximum(r0 - r1, 0.0)
+        slip = law.clamped(reach - r1, slip + gain)
+        force = forces(place, speed, slip) - rest
+        force[:, :2] += (k + 1) * step * rise
         speed = speed + 0.5 * step * force / mass
-    return (place - start)[:2].T
+    return place - packing.position
 
 
-def test_is_the_motion_of_the_law(bound):
+@pytest.mark.parametrize("rises", [False, True])
+def test_is_the_motion_of_the_law(bound, rises):
+    """After a push, and under a load that rises; contacts slide, in both directions."""
     count, step = 400, MOTION_STEP * OneSidedSystem.of(bound).stable_step
-    time = count * step
-    velocity = np.random.default_rng(3).standard_normal((len(bound), 2))
-    found = one_sided_motion(bound, velocity, times=[time])
-    assert np.count_nonzero(found.slid[-1] > 0) > 3  # contacts slide, in both directions
+    given = np.random.default_rng(3 + rises).standard_normal((len(bound), 2))
+    found = one_sided_motion(bound, **{"rise" if rises else "velocity": given}, times=[count * step])
+    assert np.count_nonzero(found.slid[-1] > 0) > 2 + (not rises)
     assert len(sliders_of(bound.configuration)) == np.count_nonzero(bound.sliding)
-    followed = integrate(bound, PUSH * velocity, step, count) / PUSH
+    push, rise = (0 * given, PUSH * given) if rises else (PUSH * given, 0.0)
+    followed = integrate(bound, push, step, count, rise) / PUSH
     size = np.abs(found.displacement[0]).max()
     np.testing.assert_allclose(followed, found.displacement[0], rtol=0, atol=1e-4 * size)  # second order in PUSH
-    # sticking contacts alone move otherwise
-    linear = expm(time * motion_matrix(bound)) @ np.concatenate([np.zeros(18), *velocity.T, np.zeros(6)])
-    assert np.abs(linear[:12].reshape(2, 6).T - found.displacement[0]).max() > 0.1 * size
-
-
-def test_is_the_motion_of_the_law_under_a_load_that_rises(bound):
-    count, step = 400, MOTION_STEP * OneSidedSystem.of(bound).stable_step
-    rise = np.random.default_rng(4).standard_normal((len(bound), 2))
-    found = one_sided_motion(bound, rise=rise, times=[count * step])
-    followed = integrate(bound, 0 * rise, step, count, PUSH * rise) / PUSH
-    size = np.abs(found.displacement[0]).max()
-    np.testing.assert_allclose(followed, found.displacement[0], rtol=0, atol=1e-4 * size)
-    assert np.count_nonzero(found.slid[-1] > 0) > 2
+    if not rises:  # sticking contacts alone move otherwise
+        linear = expm(count * step * motion_matrix(bound)) @ np.concatenate([np.zeros(18), *given.T, np.zeros(6)])
+        assert np.abs(linear[:12].reshape(2, 6).T - found.displacement[0]).max() > 0.1 * size
 
 
 @settings(max_examples=10, deadline=None)
@@ -157,12 +136,9 @@ def test_a_body_moves_as_one(bound):
     held = np.zeros((size, size))
     held[0, 0] = k
     body = derive_frozen(
-        configuration,
-        contacts=configuration.contacts.chosen(np.zeros(len(configuration.contacts), bool)),
-        stiffness=csr_array(held),
-        damping=csr_array((size, size)),
-        constraint=csr_array(lead),
-    )
+        configuration, contacts=configuration.contacts.chosen(np.zeros(len(configuration.contacts), bool)),
+        stiffness=csr_array(held), damping=csr_array((size, size)), constraint=csr_array(lead),
+    )  # fmt: skip
     rise = np.zeros((n, 2))
     rise[:2, 0] = rate / 2
     times = np.array([0.7, 3.0])
@@ -181,15 +157,11 @@ def test_a_body_moves_as_one(bound):
 def test_a_disk_that_touches_nothing_flies_on(bound, drag_time):
     """With the drag v = v_0 exp(-t/tau); under a load that rises without drag x = v_0 t + g t^3 / 6 m."""
     n, times = len(bound), np.array([0.5, 1.0, 3.0])
+    more = {"radius": 0.5, "angle": 0.0, "top": False, "mass": 4.0}
     with_rattler = replace(
-        bound,
-        position=np.vstack([bound.position, bound.position.max(axis=0) + 20.0]),
-        radius=np.append(bound.radius, 0.5),
-        angle=np.append(bound.angle, 0.0),
-        top=np.append(bound.top, False),
-        mass=np.append(bound.mass, 4.0),
-        drag_time=drag_time,
-    )
+        bound, position=np.vstack([bound.position, bound.position.max(axis=0) + 20.0]), drag_time=drag_time,
+        **{name: np.append(getattr(bound, name), value) for name, value in more.items()},
+    )  # fmt: skip
     assert list(with_rattler.rattlers) == [n]
     velocity, rise = np.ones((n + 1, 2)), np.full((n + 1, 2), 3.0)
     found = one_sided_motion(with_rattler, velocity, times=times)

@@ -5,12 +5,12 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from known_spectra import of_stiffness
 from linearised import dissipative, motion_matrix
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import Configuration, layer_force, linear_response, mean_square_displacement
-from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT, LinearisedContacts
+from faultgouge.analysis import layer_force, linear_response, mean_square_displacement
 
 OMEGA = 2.0
 """That of a motion of `oblique`: resonance."""
@@ -18,23 +18,22 @@ OMEGA = 2.0
 DISTANCES = [0.3, 1e-2, 1e-6, 1e-12, 0.0, -1e-6]
 
 
-def oblique(epsilon: float) -> np.ndarray:
+def oblique(epsilon):
     """The normal form with delta = 0.2 beside three other modes, in an oblique basis of condition 3 or so."""
-    inner = np.diag([0.8, 1.2, 3.0, 4.0, 6.0])
-    inner[0, 1], inner[1, 0] = 0.2 * (1 - epsilon), -0.2 * (1 - epsilon)
-    return turned(inner)
+    eta = 0.2 * (1 - epsilon)
+    return turned(block_diag([[0.8, eta], [-eta, 1.2]], 3.0, 4.0, 6.0))
 
 
-def turned(inner: np.ndarray) -> np.ndarray:
+def turned(inner):
     """A matrix in an oblique basis."""
     size = len(inner)
     basis = np.eye(size) + 0.2 * np.random.default_rng(3).normal(size=(size, size))
     return basis @ inner @ np.linalg.inv(basis)
 
 
-def vectors(size: int) -> tuple[np.ndarray, np.ndarray]:
+def vectors(size):
     """A force and a start."""
-    return tuple(np.random.default_rng(4).normal(size=(2, size)))
+    return np.random.default_rng(4).normal(size=(2, size))
 
 
 def by_digits(matrix, force, start, time, tau):
@@ -56,17 +55,9 @@ def by_digits(matrix, force, start, time, tau):
 
 def motion_of(matrix, force, start, time, tau=None, dt=None):
     """Of two disks of unit mass whose K is given; the first coordinates move."""
-    none, size = csr_array((6, 6)), len(matrix)
-    stiffness, damping = (
-        none + csr_array(np.pad(each, (0, 6 - size))) for each in (matrix, np.eye(size) / (tau or np.inf))
-    )
-    kinds = dict.fromkeys(PER_CONTACT, float) | dict.fromkeys("ij", int) | dict.fromkeys(BOOLEAN, bool)
-    contacts = LinearisedContacts(**{name: np.zeros((0, *shape), kinds[name]) for name, shape in PER_CONTACT.items()})
-    disks = Configuration(
-        dimension=2, position=np.zeros((2, 2)), radius=np.ones(2), mass=np.ones(2), inertia=np.ones(2),
-        contacts=contacts, box=np.eye(3), origin=np.zeros(3), periodic=[False] * 3, load=np.zeros((2, 2, 3)),
-        stiffness=stiffness, damping=csr_array(damping * (tau is not None)),
-    )  # fmt: skip
+    size = len(matrix)
+    stiffness, damping = (csr_array(np.pad(k, (0, 6 - size))) for k in (matrix, np.eye(size) / (tau or np.inf)))
+    disks = of_stiffness(stiffness, damping if tau else None)
     force, start = (np.pad(each, (0, 6 - size)) for each in (force, start))
     found = linear_response(disks, time, force=force, omega=OMEGA, initial=start, dt=dt)
     return found.displacement[:, :size], found.velocity[:, :size]
@@ -86,10 +77,7 @@ def test_nothing_is_lost_near_a_coalescence(epsilon, tau):
 
 def test_two_pairs_and_a_pair_among_other_modes():
     """Two coalescences, one of them with a third eigenvalue between its members."""
-    inner = np.zeros((6, 6))
-    inner[:2, :2] = [[0.8, 0.2], [-0.2, 1.2]]
-    inner[2:4, 2:4] = [[2.0, 200.0], [0.0, 4.0]]  # overlap 2/200
-    inner[4, 4], inner[5, 5] = 3.0, 5.0
+    inner = block_diag([[0.8, 0.2], [-0.2, 1.2]], [[2.0, 200.0], [0.0, 4.0]], 3.0, 5.0)  # the second overlaps by 2/200
     matrix, (force, start) = turned(inner), vectors(6)
     found = motion_of(matrix, force, start, [20.0])
     for part, expected in zip(found, by_digits(matrix, force, start, 20.0, None), strict=True):

@@ -48,7 +48,7 @@ def test_detector_finds_the_same_while_the_run_goes_on():
             assert row[0] - slip.ends == pytest.approx(2 * PERIOD, abs=1.5 * EVERY)
             found.append(slip)
             assert find_slips(*zip(*rows[: k + 1], strict=True), VELOCITY, PERIOD)[0] == found
-            assert not detector.under_way
+            assert detector.so_far is None
     assert len(found) == len(SLIPS)
 
 
@@ -62,12 +62,9 @@ def test_slip_that_has_not_ended_is_told_apart():
     assert under_way.slip == pytest.approx(size * (time[-1] - begin) / lasts, rel=0.01)
 
 
-def test_layer_that_follows_the_spring_has_no_slips():
+def test_friction_and_a_layer_that_follows_the_spring_without_slips():
     time = np.arange(0.0, 400.0, EVERY)
     assert find_slips(time, np.full_like(time, 0.5), VELOCITY * time, 0 * time, VELOCITY, PERIOD) == ([], None)
-
-
-def test_friction():
     time, force, moved, energy = series()
     slips, _ = find_slips(time, force, moved, energy, VELOCITY, PERIOD)
     friction = friction_of(time, force, slips, fy=3.0)

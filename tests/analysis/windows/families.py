@@ -33,6 +33,11 @@ def crossing(place, product):
     return operator
 
 
+def then_jumping(f):
+    """A window of two levels, and a jump to another one at 1.1, which takes bisection, and divided increments."""
+    return crossing(0.6, -0.01)(f) if f < 1.1 else crossing(1.2, -0.04)(f)
+
+
 # The eigenvalues of the embedded block are good to some 50 u |A| = 1e-12, and D of order 1 to about that.
 DIGITS = 1e-11
 

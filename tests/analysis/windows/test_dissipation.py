@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.windows import System, find_onset, find_windows
-from faultgouge.analysis.windows.find_onset import windows_up_to
+from faultgouge.analysis.windows.search import Search
 
 RNG = np.random.default_rng(11)
 TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
@@ -55,10 +55,8 @@ def test_windows_narrower_than_the_increment(half_width, damping):
         assert found == ()
         return
     (window,) = found
-    reach = 0.4 + 3 * half_width + np.array([0, 10 * half_width])
-    edges = [
-        brentq(lambda fx: growth(block, damping, fx), 0.4, 0.4 + s * (reach[1] - 0.4), xtol=1e-14) for s in (-1, 1)
-    ]
+    far = 0.4 + 13 * half_width * np.array([-1, 1])
+    edges = [brentq(lambda fx: growth(block, damping, fx), 0.4, end, xtol=1e-14) for end in far]
     # Re s is known to 1e-15; its slope is the damping over the width, or one where the block is nearly defective
     digits = 1e-10 + 1e-14 * half_width / max(damping)
     assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=digits)
@@ -67,55 +65,39 @@ def test_windows_narrower_than_the_increment(half_width, damping):
     assert window.error < 10 * digits
 
 
-def test_nothing_grows_where_levels_repel():
-    def block(fx):
-        return np.array([[10 + fx - 0.4, 1e-2], [1e-2, 10 - fx + 0.4]])
-
-    assert find_windows(family(block, (1e-3, 1e-4)), [0.0, 1.0]) == ()
-
-
-@pytest.mark.long
 def test_a_steady_loss_of_stability_is_no_hopf_point():
-    """A restoring force that vanishes: s = 0."""
-
-    def block(fx):
-        return np.diag([10 * (0.3 - fx), 12.0])
-
-    (window,) = find_windows(family(block, (1e-2, 1e-2)), [0.0, 1.0])
-    assert window.kind == "steady"
+    """A restoring force that vanishes: s = 0. And nothing grows where levels repel each other."""
+    (window,) = find_windows(family(lambda fx: np.diag([10 * (0.3 - fx), 12.0]), (1e-2, 1e-2)), [0.0, 1.0])
+    assert (window.kind, window.fx_end) == ("steady", None)
     assert window.fx_onset == pytest.approx(0.3, abs=1e-10)
-    assert window.fx_end is None
+    repels = family(lambda fx: np.array([[9.6 + fx, 1e-2], [1e-2, 10.4 - fx]]), (1e-3, 1e-4))
+    assert find_windows(repels, [0.0, 1.0]) == ()
 
 
-def test_what_is_known_is_told_as_it_comes():
-    told = list(windows_up_to(family(crossing(0.2), (1e-3, 1e-3)), [-1.0, 0.0, 0.4, 1.0, 2.0]))
+def test_what_is_known_is_told_as_it_comes_and_what_grows_from_the_beginning():
+    told = list(Search(family(crossing(0.2), (1e-3, 1e-3)), 1e-7).along([-1.0, 0.0, 0.4, 1.0, 2.0]))
     assert [fx for fx, _ in told] == [0.0, 0.4, 1.0, 2.0]
-    assert [len(windows) for _, windows in told] == [0, 1, 1, 1]
-    assert [windows[0].fx_end is None for _, windows in told[1:]] == [True, False, False]
+    assert [[each.fx_end is None for each in windows] for _, windows in told] == [[], [True], [False], [False]]
+    (window,) = find_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
+    assert (window.kind, window.fx_onset) == ("start", 0.0)
+    assert 0.15 < window.fx_end < 0.25
 
 
 def test_a_load_besides_that_has_no_equilibrium_costs_no_window():
     """Where a ramp goes on beyond a gap; a load of the ramp itself without an equilibrium is an error."""
-    pencil = family(crossing(0.2), (1e-3, 1e-3))
+    pencil, loads = family(crossing(0.2), (1e-3, 1e-3)), [-1.0, 0.0, 1.0, 2.0]
 
     def with_a_gap(fx):
         if 1.2 < fx < 1.8:
             raise NoEquilibriumError("a gap", beyond=1.2)
         return pencil(fx)
 
-    loads = [-1.0, 0.0, 1.0, 2.0]
-    looks = {0.0: [0.4], 1.0: [1.5]}
-    (window,) = find_windows(with_a_gap, loads, look=lambda below, above: looks.get(below, []))
-    looks.pop(1.0)
-    assert window == find_windows(pencil, loads, look=lambda below, above: looks.get(below, []))[0]
+    found = find_windows(
+        with_a_gap, loads, look=lambda below, above: [{0.0: 0.4, 1.0: 1.5}[below]] if below >= 0 else []
+    )
+    assert found == find_windows(pencil, loads, look=lambda below, above: [0.4] * (below == 0.0)) != ()
     with pytest.raises(NoEquilibriumError):
         find_windows(with_a_gap, [*loads[:3], 1.5, 2.0])
-
-
-def test_what_grows_from_the_beginning_says_so():
-    (window,) = find_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
-    assert (window.kind, window.fx_onset) == ("start", 0.0)
-    assert 0.15 < window.fx_end < 0.25
 
 
 @pytest.mark.parametrize(

@@ -5,20 +5,18 @@ import pytest
 from families import OTHERS, with_dissipation
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array
-from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
-from faultgouge.analysis.progress import show_progress
-from faultgouge.analysis.windows import System, find_onset, find_windows
+from faultgouge.analysis.windows import LIMITS, System, find_windows
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
 from faultgouge.pywrap import Scene, settle
 from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 from faultgouge.studies.packing_tools import path_from
 
 
-def first_window(system, loads, **how):
+def first_window(system, loads, limits=LIMITS, **how):
     """The search in slices."""
-    return SlicedSearch(system, **how).first_window(np.asarray(loads))
+    return SlicedSearch(system, limits=limits, **how).first_window(np.asarray(loads))
 
 
 KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
@@ -30,72 +28,26 @@ def path(ramp):
     return ramp(1.0, 1e-3, 26)
 
 
-@pytest.fixture(scope="module")
-def search(path):
-    """The search of the reference packing, from a little before its onset on."""
-
-    def make(kind, limits=FEW):
-        damped = with_dissipation(path, **KINDS[kind])
-        loads = np.array(path.grid[21:])
-
-        def search(watch=None, **how):
-            with show_progress(watch):
-                return first_window(lambda fx: System.of(damped(fx), dissipation=True), loads, limits=limits, **how)
-
-        return search
-
-    return make
+def of_kind(path, kind):
+    """Equilibria with dissipation as systems."""
+    damped = with_dissipation(path, **KINDS[kind])
+    return lambda fx: System.of(damped(fx), dissipation=True)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "kind", [pytest.param("weak", marks=pytest.mark.long), pytest.param("medium", marks=pytest.mark.long), "drag"]
-)
-def test_the_window_is_that_among_all_modes(path, search, kind):
-    damped = with_dissipation(path, **KINDS[kind])
-    expected = find_onset(damped, path.grid[21:], dissipation=True, first=True).windows[0]
-    found, doubtful = search(kind)()
+@pytest.mark.parametrize("kind", [*(pytest.param(each, marks=pytest.mark.long) for each in ("weak", "medium")), "drag"])
+def test_the_window_is_that_among_all_modes_on_one_rank_and_on_two(path, kind):
+    """From a little before it on: that of drag lies in the third of three increments, with bases that are kept."""
+    system, loads = of_kind(path, kind), path.grid[21:]
+    (expected, *_) = find_windows(system, loads, first=True)
+    found, doubtful = first_window(system, loads, FEW)
     assert doubtful == ()
     assert abs(found.fx_onset - expected.fx_onset) <= found.error + expected.error
     assert found.frequency == pytest.approx(expected.frequency, rel=1e-8)
     assert found.kind == expected.kind == "hopf"
     assert found.error < 1e-9
-
-
-@pytest.mark.long
-def test_a_search_goes_on_to_the_bit_on_two_ranks(search, tmp_path):
-    expected = search("weak", PASSING)()
-    cut_off(search("weak", PASSING), 8, tmp_path)
-    for each in on_ranks(2, lambda mine: search("weak", PASSING)(ranks=mine, folder=tmp_path)):
-        assert each.result() == expected
-
-
-@pytest.mark.slow
-def test_ranks_find_the_same_with_bases_that_are_kept(search):
-    """Up to the window of drag, in the third of three increments."""
-    expected = search("drag")()
-    for each in on_ranks(2, lambda mine: search("drag")(ranks=mine)):
-        assert each.result() == expected
-
-
-@pytest.mark.long
-def test_windows_are_the_same_in_another_unit_of_time(path):
-    """One whose squares are beyond single precision."""
-    damped, loads, unit = with_dissipation(path, cn=10.0), np.array(path.grid[21:24]), 2.0**36
-
-    def fast(fx):
-        own = System.of(damped(fx), dissipation=True)
-        return System(fx, unit**2 * own.stiffness, unit * own.damping, balance=own.balance)
-
-    for search in (
-        lambda pencil: [first_window(pencil, loads, limits=FEW)[0]],
-        lambda pencil: find_windows(pencil, loads),
-    ):
-        expected = search(lambda fx: System.of(damped(fx), dissipation=True))
-        assert len(expected)
-        for one, other in zip(search(fast), expected, strict=True):
-            assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error)
-            assert one.frequency == pytest.approx(unit * other.frequency, rel=1e-9)
+    for each in on_ranks(2, lambda mine: first_window(system, loads, FEW, ranks=mine)):
+        assert each.result() == (found, ())
 
 
 def oscillators(feed):
@@ -167,10 +119,13 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
     with path_from(settle(scene), scene) as equilibria:
         path = with_dissipation(equilibria, **kind)
 
-        def fastest_at(fx):
-            return fastest(System.of(path(fx), dissipation=True))
+        def system(fx):
+            return System.of(path(fx), dissipation=True)
 
-        window, doubtful = first_window(lambda fx: System.of(path(fx), dissipation=True), ramp_loads(scene), limits=FEW)
+        def fastest_at(fx):
+            return fastest(system(fx))
+
+        window, doubtful = first_window(system, ramp_loads(scene), FEW)
         assert doubtful == ()
         if grows:
             assert fastest_at(window.fx_onset * (1 - 1e-6)) < 1e-11 < fastest_at(window.fx_onset * (1 + 1e-6))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from families import DIGITS, OTHERS, crossing, embedded, normal_form
+from families import DIGITS, OTHERS, crossing, embedded, normal_form, then_jumping
 
 from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.uncertain_digits import with_uncertainty
@@ -22,20 +22,50 @@ def test_normal_form(d, points):
     assert window.fx_end is None
     assert window.eigenvalue == pytest.approx(1, abs=DIGITS)
     assert window.error < DIGITS
-    # |y^H x| = (1 - (e/d)^2)^(1/2) in an orthonormal basis, at the closest of the points that were evaluated.
-    assert window.onset.overlap < 1e-2
 
 
-def test_window_behind_a_bend():
+def bent(f):
     """Levels that approach, and are bent apart in the last increment: its chord alone shows no window."""
+    gap = 1 - f if f < 1.1 else 5 * (f - 1.1) - 0.1
+    return embedded([[10 + gap, 0.05], [-0.05, 10 - gap]])
 
-    def bent(f):
-        gap = 1 - f if f < 1.1 else 5 * (f - 1.1) - 0.1
-        return embedded([[10 + gap, 0.05], [-0.05, 10 - gap]])
 
-    first, second = complex_windows(bent, [0.0, 0.5, 0.9, 1.3])
-    assert (first.fx_onset, first.fx_end) == (pytest.approx(0.95, abs=DIGITS), pytest.approx(1.05, abs=DIGITS))
-    assert (second.fx_onset, second.fx_end) == (pytest.approx(1.11, abs=DIGITS), pytest.approx(1.13, abs=DIGITS))
+def with_a_long_window(f):
+    """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
+    matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
+    matrix[0, 1], matrix[1, 0] = 1.0, (f - 0.35) * (f - 8.6)
+    matrix[2:4, 2:4] += [[f - 5.25, 0.05], [-0.05, 5.25 - f]]
+    return matrix
+
+
+def with_a_hole(low, high):
+    """A window from 0.3 to 0.7, and loads without an equilibrium."""
+
+    def operator(f):
+        if low < f < high:
+            raise NoEquilibriumError("no equilibrium")
+        return crossing(0.5, -0.04)(f)
+
+    return operator
+
+
+@pytest.mark.parametrize(
+    ("operator", "loads", "edges"),
+    [
+        (bent, [0.0, 0.5, 0.9, 1.3], [(0.95, 1.05), (1.11, 1.13)]),
+        # a pair that is complex at both ends of an increment and real in between
+        (lambda f: embedded([[10, f - 0.35], [0.55 - f, 10]]), [0.0, 1.0], [(0.0, 0.35), (0.55, np.inf)]),
+        (with_a_long_window, np.arange(10.0), [(0.35, 8.6), (5.2, 5.3)]),  # which keep their names
+        (with_a_hole(0.49, 0.51), [0.0, 1.0], [(0.3, 0.7)]),
+        *((crossing(0.37, product), np.linspace(0, 1, 4), []) for product in (0.0, 1e-12, 1e-4, 0.3)),
+        (then_jumping, [0.0, 0.5, 1.0, 1.5], [(0.5, 0.7), (1.1, 1.4)]),
+    ],
+)
+def test_windows_that_are_known(operator, loads, edges):
+    found = complex_windows(operator, loads)
+    ends = [(each.fx_onset, np.inf if each.fx_end is None else each.fx_end) for each in found]
+    assert np.ravel(ends) == pytest.approx(np.ravel(edges), abs=1e-8 if operator is then_jumping else DIGITS)
+    assert all((each.kind == "start") == (each.fx_onset == 0.0) for each in found)
 
 
 @pytest.mark.parametrize(
@@ -81,24 +111,6 @@ def test_window_narrower_than_the_increment(half_width, place):
     assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=DIGITS)
 
 
-@pytest.mark.parametrize("product", [0.0, 1e-12, 1e-4, 0.3])
-def test_crossings_are_no_windows(product):
-    assert complex_windows(crossing(0.37, product), np.linspace(0, 1, 4)) == ()
-
-
-def test_gap_inside_a_window_is_seen():
-    """A pair that is complex at both ends of an increment and real in between: two windows."""
-
-    def operator(f):
-        return embedded([[10, f - 0.35], [0.55 - f, 10]])
-
-    first, second = complex_windows(operator, [0.0, 1.0])
-    assert (first.kind, first.fx_onset) == ("start", 0.0)
-    assert first.fx_end == pytest.approx(0.35, abs=DIGITS)
-    assert second.fx_onset == pytest.approx(0.55, abs=DIGITS)
-    assert second.fx_end is None
-
-
 def test_noise_loses_its_imaginary_part():
     """A double eigenvalue in Jordan form splits by (u |A|)^(1/2), real or complex as rounding has it."""
     split = 0
@@ -117,38 +129,11 @@ def test_noise_loses_its_imaginary_part():
 
 @pytest.mark.parametrize("disks", [300, 50])
 def test_no_onset_is_said_so(path, disks):
-    """By the search of a small packing, and by that of a large one."""
+    """By the search of a small packing, and by that of a large one; also where it comes from another process."""
     with pytest.raises(OnsetError, match=r"up to F_x = 0\.003: raise the largest load"):
         find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
-
-
-@pytest.mark.parametrize("error", [OnsetError, NoGrowthError])
-def test_the_error_of_no_onset_gives_each_user_his_own_advice(error):
-    """Also where it comes from another process."""
-    found = pickle.loads(pickle.dumps(error("Nothing grows up to F_x = 1", "raise the largest load", finer=True)))
-    assert str(found) == "Nothing grows up to F_x = 1: take smaller increments, or raise the largest load."
-    assert str(error("The packing flows")) == "The packing flows"
-
-
-def family_with_a_long_window(f):
-    """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
-    matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
-    matrix[0, 1], matrix[1, 0] = 1.0, (f - 0.35) * (f - 8.6)
-    matrix[2:4, 2:4] += [[f - 5.25, 0.05], [-0.05, 5.25 - f]]
-    return matrix
-
-
-def test_open_windows_keep_their_names_over_increments_that_are_skipped():
-    edges = [(window.fx_onset, window.fx_end) for window in complex_windows(family_with_a_long_window, np.arange(10.0))]
-    np.testing.assert_allclose(edges, [(0.35, 8.6), (5.2, 5.3)], atol=1e-9)
-
-
-@pytest.mark.slow
-def test_an_onset_in_words(path):
-    onset = find_onset(path, path.grid[20:])
-    written = with_uncertainty(onset.fx_c, onset.error)
-    assert repr(onset).startswith(f"<Onset: F_x^c = {written}, ")
-    assert f"from {written}</th>" in onset._repr_html_()
+    found = pickle.loads(pickle.dumps(NoGrowthError("Nothing grows", "raise the largest load", finer=True)))
+    assert str(found) == "Nothing grows: take smaller increments, or raise the largest load."
 
 
 def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
@@ -197,43 +182,37 @@ def test_what_is_out_of_balance_is_part_of_the_error(path):
 def test_contacts_without_force_are_left_out(reference_packing):
     """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
     packing = reference_packing(1.0)
-    rattler = packing.rattlers[0]
-    apart = packing.position[rattler] - packing.position
-    distance, reach = np.hypot(*apart.T), packing.radius + packing.radius[rattler]
-    gap = distance - reach
+    contacts, rattler, position = packing.contacts, packing.rattlers[0], packing.position.copy()
+    apart = position[rattler] - position
+    gap = np.hypot(*apart.T) - packing.radius - packing.radius[rattler]
     gap[packing.rattlers] = np.inf
     neighbour = int(np.argmin(gap))
-    position = packing.position.copy()
-    position[rattler] -= (gap[neighbour] + 1e-12) * apart[neighbour] / distance[neighbour]
-    contacts = packing.contacts
+    position[rattler] -= (gap[neighbour] + 1e-12) * apart[neighbour] / np.hypot(*apart[neighbour])
     more = Contacts(np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0))
     touching = replace(packing, position=position, contacts=more)
     assert len(touching.rattlers) == len(packing.rattlers) - 1
     assert touching.residual == packing.residual
     assert len(force_bearing(touching).contacts) == len(contacts)
     assert abs(System.of(touching).stiffness - System.of(packing).stiffness).max() == 0
-    # Not so where the balance is bad because the packing is none.
-    assert force_bearing(replace(touching, fx=1.0)).residual > 0.1
-    assert len(force_bearing(replace(touching, fx=1.0)).contacts) >= len(contacts)
+    # not so where the balance is bad because the packing is none
+    moves = force_bearing(replace(touching, fx=1.0))
+    assert moves.residual > 0.1
+    assert len(moves.contacts) >= len(contacts)
 
 
-@pytest.mark.parametrize(("hole", "error"), [((0.49, 0.51), DIGITS), ((0.299, 0.301), 2e-3)])
-def test_loads_without_equilibrium_are_gone_around(hole, error):
-    """Where no edge lies nothing is lost; where one does it is known to about the width of the hole."""
-
-    def operator(f):
-        if hole[0] < f < hole[1]:
-            raise NoEquilibriumError("no equilibrium")
-        return crossing(0.5, -0.04)(f)
-
-    (window,) = complex_windows(operator, [0.0, 1.0])
+def test_a_load_without_equilibrium_at_an_edge_is_gone_around():
+    """The edge is known to about the width of the hole."""
+    (window,) = complex_windows(with_a_hole(0.299, 0.301), [0.0, 1.0])
     assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
-    assert window.error <= error
+    assert window.error <= 2e-3
     assert window.fx_end == pytest.approx(0.7, abs=DIGITS)
 
 
 def test_the_first_window_alone_is_that_of_all_and_nothing_beyond_it_is_asked_for(path):
     every, asked = find_onset(path, path.grid[18:]), []
+    written = with_uncertainty(every.fx_c, every.error)
+    assert repr(every).startswith(f"<Onset: F_x^c = {written}, ")
+    assert f"from {written}</th>" in every._repr_html_()
     first = find_onset(lambda fx: asked.append(fx) or path(fx), path.grid[18:], first=True)
     assert first.fx_c == pytest.approx(every.fx_c, abs=first.error + every.error)
     assert len(first.windows) == 1
