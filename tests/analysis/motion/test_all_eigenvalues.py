@@ -96,7 +96,7 @@ def sliced(monkeypatch):
 def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, in_slices, request):
     """As of forty copies of a packing side by side: rounding makes pairs of some of the negative ones, too."""
     rng = np.random.default_rng(1)
-    cells, others = 40 * [complex_block(7.0, 0.5), -0.5], rng.uniform(1, 50, 60)
+    cells, others = 40 * [complex_block(7.0, 0.5), -0.5], rng.uniform(1, 50, 120)
     whole = turned([*cells, *others], rng) if coupled else csr_array(block_diag([*cells, turned(others, rng)]))
     if in_slices:
         request.getfixturevalue("sliced")
