@@ -117,9 +117,7 @@ class Spectrum(TableDisplay):
         verdict = {None: "eigenvalues do not decide", True: "no motion grows", False: "unstable"}[self.is_stable]
         if doubts := "; ".join(no_verdict(self.packing.configuration)):
             verdict = f"not known whether the packing is stable: {doubts}"
-        real = self.eigenvalues.real
-        span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
-        numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
+        numbers = f"{counted(len(self.eigenvalues), 'eigenvalue')} of K, {counted(len(self.rattlers), 'rattler')}"
         return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}>"
 
     def _rows(self) -> dict[str, str]:
