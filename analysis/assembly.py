@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from .arrays import Floats, Indices, derive_frozen
+from .arrays import Floats, Indices, derive_frozen, ratio
 from .contacts import LinearisedContacts
 
 
@@ -58,8 +58,7 @@ class ContactDerivatives(NamedTuple):
 def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> ContactDerivatives:
     """The derivatives of each contact by u and w."""
     n, ft, b = c.normal, c.tangential_force, c.overlap_derivative(parting)
-    size = np.linalg.norm(ft, axis=1, keepdims=True)
-    along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding[:, None]
+    along = ratio(ft, np.linalg.norm(ft, axis=1, keepdims=True)) * c.sliding[:, None]
     numbers = ~c.couple, 1.0 / c.distance, c.tangential_stiffness, c.normal_force, c.normal_stiffness
     acts, curvature, stiff, force, steep = (np.asarray(each, float)[:, None, None] for each in numbers)
     nn, turned = _outer(n, n), np.cross(n, ft)

@@ -1,17 +1,11 @@
-"""Results that display themselves as a table, in a terminal and in a notebook."""
-
-from __future__ import annotations
+"""Results as tables, in a terminal and in a notebook."""
 
 import html
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 
 class TableDisplay:
-    """A result that shows itself as a table of two columns: in a notebook, and when rich prints it."""
+    """A result that shows itself in a notebook as a table of two columns."""
 
     def _rows(self) -> Mapping[str, str]:
         raise NotImplementedError
@@ -22,14 +16,6 @@ class TableDisplay:
             for name, value in self._rows().items()
         )
         return f"<table><caption>{html.escape(repr(self).strip('<>'))}</caption>{body}</table>"
-
-    def __rich__(self) -> Table:
-        from rich.table import Table
-
-        table = Table("", "", title=repr(self).strip("<>"), show_header=False, title_justify="left")
-        for name, value in self._rows().items():
-            table.add_row(name, value)
-        return table
 
 
 def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

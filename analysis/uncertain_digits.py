@@ -20,9 +20,9 @@ def with_uncertainty(value: float, error: float) -> str:
         return f"{value:.17g}"
     size = max(abs(value), error)
     if not LEAST_PLAIN <= size < MOST_PLAIN:
-        power = _exponent(size)
+        power = _split(size)[1]
         return f"{with_uncertainty(value / 10.0**power, error / 10.0**power)}e{power:+03d}"
-    places = 1 - _exponent(2 * error) if _first(error) < 2 else -_exponent(error)
+    places = 1 - _split(2 * error)[1] if _split(error)[0] < 2 else -_split(error)[1]
     units = math.ceil(error * 10.0**places * (1 - 1e-9))
     if places <= 0:
         scale = 10 ** (-places)
@@ -30,9 +30,7 @@ def with_uncertainty(value: float, error: float) -> str:
     return f"{value:.{places}f}({units:d})"
 
 
-def _exponent(error: float) -> int:
-    return int(f"{error:e}".partition("e")[2])
-
-
-def _first(error: float) -> float:
-    return float(f"{error:e}".partition("e")[0])
+def _split(error: float) -> tuple[float, int]:
+    """First digits and power of ten."""
+    digits, _, power = f"{error:e}".partition("e")
+    return float(digits), int(power)

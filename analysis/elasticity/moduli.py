@@ -178,13 +178,8 @@ class ElasticModuli:
 
 
 def volume_of(configuration: Configuration, volume: float | None = None) -> tuple[float, str]:
-    """The volume of a packing (area of disks), and which one is meant, in words.
-
-    Raises
-    ------
-    BadInputError
-        If nothing bounds the packing along an axis, and no volume is given.
-    """
+    """The volume of a packing (area of disks), and which one is meant, in words. A BadInputError if nothing bounds the
+    packing along an axis, and no volume is given."""
     c, d = configuration.contacts, configuration.dimension
     if volume is not None:
         return float(volume), f"volume {volume:g} as given"
@@ -338,13 +333,7 @@ def _require_laws(configuration: Configuration, what: str) -> None:
 
 
 class QuietResponse:
-    """Displacements under forces of one frequency; motions without stiffness are held where they are.
-
-    Parameters
-    ----------
-    frequency : float, optional
-        Radian / time; K alone without it.
-    """
+    """Displacements under forces of one frequency, or of none; motions without stiffness are held where they are."""
 
     def __init__(self, configuration: Configuration, frequency: float | None = None) -> None:
         matrix, mass = configuration.assembled_stiffness(), configuration.coordinate_mass

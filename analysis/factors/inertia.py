@@ -21,24 +21,9 @@ Counting = Callable[[Floats], Sequence[int]]
 def count_places(
     matrix: csc_array, count: Counting, modes: tuple[int, int], coarse: int
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Places between which there are few eigenvalues, and how many are below each.
-
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (E, E)
-        Symmetric.
-    count : callable
-        Counts the eigenvalues below shifts.
-    modes : tuple of (int, int)
-        Numbers of the first eigenvalue about which places are wanted, and of the first about which they are not.
-    coarse : int
-        Eigenvalues between two places at the most, unless they lie within 1e-6 of the largest.
-
-    Returns
-    -------
-    places, numbers : ndarray, shape (P,)
-        Ascending; no eigenvalue lies outside.
-    """
+    """Places between which there are few eigenvalues of a symmetric matrix, ascending, and how many are below each.
+    `modes` are the numbers of the first eigenvalue about which places are wanted, and of the first about which they are
+    not; between two places are `coarse` eigenvalues at the most, unless they lie within 1e-6 of the largest."""
     size, (first, stop) = matrix.shape[0], modes
     bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
     start = np.random.default_rng(0).standard_normal(size)

@@ -63,17 +63,9 @@ class SliceSizes:
 
 
 class Border(NamedTuple):
-    """The eigenvalues at the border of a slice, on which neighbouring slices must agree.
-
-    Attributes
-    ----------
-    modes : tuple of (int, int)
-        Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
-    first, beyond : float
-        These eigenvalues, 1 / time^2; nan beyond the end of the spectrum.
-    spacing : float
-        Mean distance of the slice's eigenvalues and of the next ones on either side, 1 / time^2.
-    """
+    """The eigenvalues at the border of a slice, on which neighbours must agree: numbers in the whole spectrum of its
+    first eigenvalue and of the first one beyond; these eigenvalues, nan beyond the end; and the mean distance of its
+    eigenvalues and of the next ones on either side."""
 
     modes: tuple[int, int]
     first: float
@@ -140,17 +132,8 @@ def compare_slices(*borders: Border) -> None:
 
 
 class SlicedSpectrum:
-    """A symmetric matrix in an order that keeps its factors sparse, to be looked at in slices.
-
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (E, E)
-        S, symmetric.
-    sizes : SliceSizes
-        Sizes and tolerances.
-    factorise : callable
-        How to factorise S - shift, its coordinates in the order of elimination.
-    """
+    """A symmetric matrix in an order that keeps its factors sparse, to be looked at in slices. `factorise` makes the
+    factors of S - shift, its coordinates in the order of elimination."""
 
     def __init__(
         self,
@@ -167,30 +150,11 @@ class SlicedSpectrum:
         return self.factorise(self.matrix, shift)[1]
 
     def walk(self, first: int, stop: int, low: float, shift: float, margin: int) -> Iterator[tuple[Slice, Solve]]:
-        """Slices from the eigenvalue of number `first` to the one before `stop`, each about a shift next to the last.
-
-        The factors of each slice count what is below its shift, so that no other counts are needed.
-
-        Parameters
-        ----------
-        first, stop : int
-            Numbers of eigenvalues.
-        low, shift : float
-            A place below the first of them, and a guess of the first shift.
-        margin : int
-            As of `slice_about`.
-
-        Yields
-        ------
-        Slice
-        callable
-            Solves (S - shift) x = b with the factors of the slice, in the order of the matrix.
-
-        Raises
-        ------
-        SliceError
-            If eigenvalues do not converge, or neighbouring slices disagree.
-        """
+        """Slices from the eigenvalue of number `first` to the one before `stop`, each about a shift next to the last,
+        and what solves (S - shift) x = b with their factors. `low` is a place below the first eigenvalue, `shift` a
+        guess of the first shift, `margin` as of `slice_about`. The factors of each slice count what is below its shift,
+        so that no other counts are needed. A SliceError if eigenvalues do not converge, or neighbouring slices
+        disagree."""
         most, before, high, again = self.sizes.slice_size, None, np.inf, False
         while first < stop:
             solve, below = self.factorise(self.matrix, shift)
@@ -225,15 +189,8 @@ class SlicedSpectrum:
     def slice_about(
         self, shift: float, own: tuple[int, int], margin: int, factors: Factorization | None = None
     ) -> Slice:
-        """The eigenvalues of these numbers, which are about the shift, by block Lanczos.
-
-        `margin` are further modes wanted on either side; `factors` those of S - shift, where they are known.
-
-        Raises
-        ------
-        SliceError
-            If they do not converge, or the factors are inaccurate.
-        """
+        """The eigenvalues of these numbers, which are about the shift, by block Lanczos, and a margin of further ones
+        on either side. A SliceError if they do not converge, or the factors are inaccurate."""
         solve, below = factors or self.factorise(self.matrix, shift)
         size, block = self.matrix.shape[0], self.sizes.block
         start = np.random.default_rng(0).standard_normal((block, size))
@@ -289,22 +246,10 @@ and Stewart, Math. Comput. 30, 772 (1976))."""
 
 
 class BlockKrylov:
-    """An orthonormal basis Q of the block Krylov space of an operator F, and H = Q^T F Q.
-
-    A block is made orthogonal to all before it until that no longer shortens it much: once is not enough. Images by a
-    nearly symmetric operator have most of what they share with the space in the last two blocks, which come first, so
-    that the whole space is gone through once, or little more. The vectors are rows, so that the products of many with a
-    few take half of the time.
-
-    Parameters
-    ----------
-    operator : callable
-        F, of columns.
-    start : ndarray, shape (b, n)
-        The first block.
-    most : int
-        Vectors at the most.
-    """
+    """An orthonormal basis Q of the block Krylov space of an operator F, from a first block, shape (b, n), up to `most`
+    vectors, and H = Q^T F Q. A block is made orthogonal to all before it until that no longer shortens it much: once is
+    not enough. Images by a nearly symmetric operator have most of what they share with the space in the last two
+    blocks, which come first. The vectors are rows, so that the products of many with a few take half of the time."""
 
     def __init__(self, operator: Solve, start: Floats, most: int) -> None:
         self.operator, (self.block, size) = operator, start.shape

@@ -45,22 +45,9 @@ GMRES_ITERATIONS = 30
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Where the stiffnesses of contacts are in the band matrix of some coordinates.
-
-    Attributes
-    ----------
-    active : ndarray of bool, shape (3N,)
-        The coordinates (x.., y.., R theta..) that the matrix has, E of them.
-    coordinates : ndarray of int, shape (E,)
-        The same in the order of the matrix.
-    disks : ndarray of int, shape (E,)
-        Whose they are.
-    width : int
-        W, diagonals on either side of the main one.
-    places : ndarray of int, shape (36 C,)
-        For each number of each contact, by partner of the row and of the column, and their coordinates; E (3W + 1) for
-        what is not in the matrix.
-    """
+    """Where the stiffnesses of contacts are in the band matrix of some coordinates: which of (x.., y.., R theta..) it
+    has, E of them; the same in its order, and their disks; W, diagonals on either side; and the place of each number of
+    each contact, shape (36 C,), E (3W + 1) for what is not in the matrix."""
 
     active: Booleans
     coordinates: Indices
@@ -69,28 +56,15 @@ class Band:
     places: Indices
 
     def matrix(self, terms: Floats) -> Floats:
-        """The matrix as LAPACK wants it, with room for what pivots fill in, shape (3W + 1, E).
-
-        Parameters
-        ----------
-        terms : ndarray, shape (3, 3, C)
-            The numbers of each contact, see :func:`~faultgouge.analysis.packing.disk_operators.contact_terms`.
-        """
+        """The matrix as LAPACK wants it, with room for what pivots fill in, shape (3W + 1, E), of `contact_terms`."""
         shape = len(self.coordinates), 3 * self.width + 1
         values = (SIGNS[..., None] * terms).ravel()
         return np.bincount(self.places, values, shape[0] * shape[1] + 1)[:-1].reshape(shape).T
 
 
 def band(i: Indices, j: Indices, active: Booleans) -> Band:
-    """The band of a packing.
-
-    Parameters
-    ----------
-    i, j : ndarray of int, shape (C,)
-        Partners of the contacts; j = -1 is the floor.
-    active : ndarray of bool, shape (3N,)
-        The coordinates (x.., y.., R theta..) that the matrix has.
-    """
+    """The band of a packing, of the partners of its contacts, -1 the floor, and the coordinates that the matrix has,
+    shape (3N,)."""
     disks = len(active) // 3
     coordinates = (_order(i, j, disks)[:, None] + disks * np.arange(3)).ravel()
     coordinates = coordinates[active[coordinates]]
@@ -116,15 +90,7 @@ def _order(i: Indices, j: Indices, disks: int) -> Indices:
 
 
 class BandSolver:
-    """K in a band, factored by LAPACK.
-
-    Parameters
-    ----------
-    band : Band
-        Where its entries are.
-    matrix : ndarray, shape (3W + 1, E)
-        K, see :meth:`Band.matrix`; it is overwritten.
-    """
+    """K in a band, factored by LAPACK; the matrix of :meth:`Band.matrix` is overwritten."""
 
     def __init__(self, band: Band, matrix: Floats) -> None:
         self._coordinates, self._width = band.coordinates, band.width
@@ -141,22 +107,9 @@ class BandSolver:
 
 
 class SparseSolver:
-    """K, solved with the factors of a matrix nearby as long as these serve, and then with its own.
-
-    Parameters
-    ----------
-    matrix : scipy.sparse.csr_array, shape (3N, 3N)
-        K; a coordinate without stiffness of its own is no unknown.
-    i, j : ndarray of int, shape (P,)
-        The pairs of disks that it couples.
-    nearby : SparseSolver, optional
-        That of a matrix nearby.
-
-    Attributes
-    ----------
-    own : bool
-        Whether it has had to make factors of its own.
-    """
+    """K, solved with the factors of a matrix nearby as long as these serve, and then with its own. A coordinate without
+    stiffness of its own is no unknown; `i` and `j` are the pairs of disks that K couples. `own` is whether it has had
+    to make factors of its own."""
 
     def __init__(self, matrix: csr_array, i: Indices, j: Indices, nearby: "SparseSolver | None" = None) -> None:
         self._stiffness, self._pairs, self.own = matrix.diagonal(), (i, j), False
@@ -220,22 +173,8 @@ Solver: TypeAlias = BandSolver | SparseSolver
 
 
 def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) -> Indices:
-    """A fill-reducing order of coordinates.
-
-    Parameters
-    ----------
-    i, j : ndarray of int, shape (P,)
-        The pairs of disks whose coordinates are coupled.
-    disks : int
-        N.
-    coordinates : ndarray of int, shape (E,)
-        Which of the 3N coordinates (x.., y.., R theta..) are unknown.
-
-    Returns
-    -------
-    ndarray of int, shape (E,)
-        A permutation of range(E).
-    """
+    """A fill-reducing order of some of the 3N coordinates (x.., y.., R theta..), a permutation of range(E), where these
+    pairs of disks are coupled."""
     every = np.arange(disks)
     graph = coo_array((np.ones(2 * len(i) + disks), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))))
     place = elimination_places(csc_array(graph))

@@ -64,19 +64,8 @@ def _places(*arrays: NDArray[Any]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class CompiledFactors:
-    """Factors of a matrix of `n` rows.
-
-    Attributes
-    ----------
-    library : ctypes.CDLL
-        That of `ldu.cpp`.
-    start, row : ndarray of int64 and int32, shape (n + 1,) and (entries,)
-        The pattern of L without its diagonal, in compressed columns.
-    lower, upper : ndarray, shape (entries,)
-        The entries of L, and of the transpose of U; one array if the matrix is symmetric.
-    pivot : ndarray, shape (n,)
-        The diagonal of D.
-    """
+    """Factors of a matrix of `n` rows by the library of `ldu.cpp`: the pattern of L without its diagonal in compressed
+    columns; the entries of L, and of the transpose of U, one array if the matrix is symmetric; the diagonal of D."""
 
     library: ctypes.CDLL
     start: NDArray[np.int64]
@@ -126,15 +115,7 @@ class CompiledFactors:
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Factors of a matrix A.
-
-    Attributes
-    ----------
-    made : CompiledFactors or scipy.sparse.linalg.SuperLU
-        Of the rows in the order of elimination.
-    order : ndarray of int, shape (n,), or None
-        The rows in this order; None if A is given in it.
-    """
+    """Factors of a matrix A, of its rows in an order of elimination; without one A is given in it."""
 
     made: CompiledFactors | SuperLU
     order: Indices | None = None

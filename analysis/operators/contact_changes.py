@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
-from ..arrays import Floats, Indices
+from ..arrays import Floats, Indices, ratio
 from ..configuration import Configuration
 from .gaps import gaps_of
 from .linearised_contacts import overlap_rows, tangential_rows
@@ -91,10 +91,9 @@ class ContactChanges:
         overlaps = overlap_rows(configuration)
         bears = np.isfinite(c.friction) & (c.friction > 0) & (c.normal_force > 0)
         bound = np.where(bears, c.friction, 0.0)
-        slope = np.divide(bound * c.normal_stiffness, c.normal_force, out=np.zeros(len(c)), where=bears)
-        none = np.zeros(len(c))
+        slope, none = ratio(bound * c.normal_stiffness, c.normal_force), np.zeros(len(c))
         viscous = [tangential_rows(configuration, each, c.tangential_dashpot, none) for each in (along, across)]
-        of_bound = np.divide(bound * c.normal_dashpot * c.viscous_slider, c.normal_force, out=none.copy(), where=bears)
+        of_bound = ratio(bound * c.normal_dashpot * c.viscous_slider, c.normal_force)
         dashpots = vstack([*viscous, diags_array(of_bound) @ overlaps])
         wears = np.flatnonzero(c.two_derivatives)
         difference = 0.5 * (c.closing - c.parting)[wears]
@@ -107,17 +106,9 @@ class ContactChanges:
         )  # fmt: skip
 
     def multiples(self, displacement: Floats, velocity: Floats, slid: Floats, paths: Floats) -> Multiples:
-        """The smallest multiples above zero of P motions that change each contact, and each gap.
-
-        Parameters
-        ----------
-        displacement, velocity : ndarray, shape (coordinates, P)
-            Length, and length / time.
-        slid : ndarray, shape (B, P)
-            p of contacts at the bound, force.
-        paths : ndarray, shape (R, P)
-            Paths of the overlaps of contacts with two derivatives, length.
-        """
+        """The smallest multiples above zero of P motions, shape (coordinates, P), that change each contact, and each
+        gap; with p of contacts at the bound, (B, P), and paths of the overlaps of contacts with two derivatives, (R,
+        P)."""
         count = len(self.bound)
         products = np.asarray(self.rows @ displacement)
         along, across, closing = products[: 3 * count].reshape(3, count, products.shape[1])

@@ -22,17 +22,8 @@ SAME_PLANE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Pairs that nearly touch, G of them.
-
-    Attributes
-    ----------
-    i, j : ndarray of int, shape (G,)
-        Partners; j is -1 for a plane.
-    normal : ndarray, shape (G, 3)
-        Unit vector towards i.
-    gap : ndarray, shape (G,)
-        Distance of the surfaces, length.
-    """
+    """Pairs that nearly touch, G of them: partners, j = -1 for a plane; unit vectors towards i; distances of the
+    surfaces."""
 
     i: Indices
     j: Indices
@@ -47,26 +38,9 @@ class Gaps:
 def near_pairs(
     position: Floats, radius: Floats, box: Floats, periodic: ArrayLike, apart: float = 0.0
 ) -> tuple[Indices, Indices, Floats]:
-    """Pairs of spheres whose surfaces are nearer than a distance, through the sides of the box, too.
-
-    The larger of two, or the later one, finds the other. A sphere that is near two images of another makes two pairs.
-
-    Parameters
-    ----------
-    position, radius : ndarray, shapes (N, 3) and (N,)
-        Centres and radii, length.
-    box : ndarray, shape (3, 3)
-        Edges in rows, with `periodic` of each.
-    apart : float
-        The distance, length; 0 for those that overlap.
-
-    Returns
-    -------
-    i, j : ndarray of int, shape (C,)
-        Ascending, i < j.
-    branch : ndarray, shape (C, 3)
-        From j to i, length.
-    """
+    """Pairs i < j of spheres whose surfaces are nearer than `apart`, 0 for those that overlap, ascending, and the
+    vectors from j to i, shape (C, 3); through the sides of the box, too, whose edges are rows. A sphere that is near
+    two images of another makes two pairs."""
     from scipy.spatial import cKDTree  # which takes as long to import as all of `scipy.sparse`
 
     tree, far = cKDTree(position), 2 * radius + apart

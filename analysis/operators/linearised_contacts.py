@@ -44,15 +44,7 @@ def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
 
 
 def tangential_rows(configuration: Configuration, along: Floats, tangential: Floats, normal: Floats) -> csr_array:
-    """Rows -k e . ds + b d delta of the contacts.
-
-    Parameters
-    ----------
-    along : ndarray, shape (C, 3)
-        Unit vectors e in the planes of the contacts.
-    tangential, normal : ndarray, shape (C,)
-        k and b.
-    """
+    """Rows -k e . ds + b d delta of the contacts, of unit vectors e in their planes and of numbers k and b."""
     c = configuration.contacts
     shift = each_of((tangential * ~c.couple)[:, None] * along + normal[:, None] * c.normal)
     turn = each_of(tangential[:, None] * np.cross(along, c.normal))

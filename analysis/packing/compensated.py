@@ -43,22 +43,8 @@ def exact_product(a: ArrayLike, b: ArrayLike) -> DoubleDouble:
 def separation(
     position: Floats, low: Floats | None, other: Floats, other_low: Floats | None, box_length: float | None
 ) -> DoubleDouble:
-    """Vectors from other points to points, by the nearest periodic image along x.
-
-    Parameters
-    ----------
-    position, other : ndarray, shape (..., 2)
-        Coordinates, length.
-    low, other_low : ndarray, shape (..., 2), or None
-        Their low parts; None for exact doubles.
-    box_length : float or None
-        Period along x.
-
-    Returns
-    -------
-    high, low : ndarray, shape (..., 2)
-        Normalized.
-    """
+    """Vectors from other points to points, shape (..., 2), by the nearest image along x, with their low parts; low
+    parts of coordinates are None for exact doubles."""
     difference, error = exact_sum(position, -np.asarray(other))
     if box_length is not None:
         shift = np.zeros_like(difference)
@@ -75,22 +61,8 @@ def separation(
 
 
 def overlap_and_distance(branch: DoubleDouble, reach: DoubleDouble) -> tuple[DoubleDouble, Floats]:
-    """Overlap of disks and the distance of their centres.
-
-    Parameters
-    ----------
-    branch : pair of ndarray, shape (C, 2)
-        Branch vectors, see `separation`.
-    reach : pair of ndarray, shape (C,)
-        Sums of radii.
-
-    Returns
-    -------
-    overlap : pair of ndarray, shape (C,)
-        R_i + R_j - r; its high part has full relative precision, also where it is negative.
-    distance : ndarray, shape (C,)
-        r.
-    """
+    """Overlap R_i + R_j - r of branch vectors, shape (C, 2), and sums of radii, and the distance r. The high part of
+    the overlap has full relative precision, also where it is negative."""
     (high, low), (c, c_low) = branch, reach
     distance = np.hypot(high[:, 0], high[:, 1])
     gap = exact_product(c, c)

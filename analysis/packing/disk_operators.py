@@ -29,24 +29,8 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def assemble_stiffness(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:
-    """K from the numbers of each contact.
-
-    Parameters
-    ----------
-    terms : ndarray, shape (3, 3, C)
-        See `contact_terms`.
-    i : ndarray of int, shape (C,)
-        First partners.
-    j : ndarray of int, shape (P,)
-        Second partners of the contacts of two disks, which come first.
-    disks : int
-        N.
-
-    Returns
-    -------
-    scipy.sparse.csr_array, shape (3N, 3N)
-        As `stiffness_matrix`.
-    """
+    """K, shape (3N, 3N), from the numbers of each contact (`contact_terms`), the first partners, and the second ones of
+    the contacts of two disks, which come first."""
     axes, pairs = 3 if terms[2].any() else 2, len(j)
     terms, signs = terms[:axes, :axes], SIGNS[:, :, :axes, :axes, None]
     # Two disks share one contact, so the off-diagonal blocks are final; only the diagonal ones are sums.
@@ -69,26 +53,9 @@ def assemble_stiffness(terms: Floats, i: Indices, j: Indices, disks: int) -> csr
 
 
 def contact_terms(law: Derivatives, normal: Floats, distance: Floats, pairs: int, form: Form = "consistent") -> Floats:
-    """The nine numbers of each contact that K is assembled from: its block of the first partner with itself.
-
-    Parameters
-    ----------
-    law : Derivatives
-        Of the contact law, at each contact.
-    normal : ndarray, shape (2, C)
-        Unit vectors n towards i.
-    distance : ndarray, shape (C,)
-        Lengths of the branch vectors.
-    pairs : int
-        Contacts of two disks; those with the floor follow.
-    form : {"consistent", "paper"}
-        As in :func:`stiffness_matrix`.
-
-    Returns
-    -------
-    ndarray, shape (3, 3, C)
-        Force / length, rows and columns (x, y, u).
-    """
+    """The nine numbers of each contact that K is assembled from, its block of the first partner with itself: rows and
+    columns (x, y, u), shape (3, 3, C). The first `pairs` contacts are those of two disks; normals have the shape (2,
+    C)."""
     a, b, stiffness = law.slip_derivative, law.overlap_derivative, law.normal_stiffness
     # only contacts of finite length turn; the floor's distance is a height and may even be zero
     across, turn = a.copy(), np.zeros_like(b)

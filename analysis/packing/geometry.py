@@ -40,18 +40,8 @@ class ContactGeometry(NamedTuple):
 def contact_geometry(
     position: Floats, low: Floats | None, radius: Floats, contacts: Contacts, box_length: float | None
 ) -> tuple[ContactGeometry, DoubleDouble, DoubleDouble]:
-    """The geometry of contacts, and the branch vectors and overlaps with their low parts.
-
-    Parameters
-    ----------
-    position, low, radius, contacts, box_length
-        As of :class:`~faultgouge.analysis.Packing`; low is its position_low.
-
-    Raises
-    ------
-    BadInputError
-        If two disks in contact have the same centre.
-    """
+    """The geometry of contacts of a Packing, and their branch vectors and overlaps with low parts; `low` are the low
+    parts of its positions. A BadInputError if two disks in contact have the same centre."""
     i, j, floor = contacts.i, contacts.j, contacts.floor
     low_i, low_j = (None, None) if low is None else (low[i], low[j])
     branch = separation(position[i], low_i, position[j], low_j, box_length)
@@ -79,20 +69,7 @@ def contact_geometry(
 
 
 def nearest_image(difference: Floats, box_length: float | None) -> Floats:
-    """Coordinate differences to the nearest periodic image along x.
-
-    Parameters
-    ----------
-    difference : ndarray, shape (..., 2)
-        Differences of coordinates, length.
-    box_length : float or None
-        The period along x, length; None without periodicity.
-
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        A new array.
-    """
+    """Coordinate differences, shape (..., 2), to the nearest image by the period along x, length; a new array."""
     difference = np.array(difference, dtype=np.float64)
     if box_length is not None:
         difference[..., 0] -= box_length * np.round(difference[..., 0] / box_length)

@@ -112,13 +112,12 @@ Only this module and mindlin_law.h contain the law. See docs/howto_law.md for ho
 """
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Booleans, Floats, ratio, set_frozen
+from ..arrays import LARGEST, Booleans, Floats, ratio, set_frozen
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
@@ -192,9 +191,9 @@ class MindlinLaw:
         for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
             value = float(getattr(self, name))
             set_frozen(self, **{name: value})
-            if not isfinite(value) or value < 0 or (name == "kn" and value == 0):
+            if not 0 <= value <= LARGEST or (name == "kn" and value == 0):
                 sign = "positive" if name == "kn" else "not negative"
-                raise ValueError(f"{name} = {value} must be finite and {sign}.")
+                raise ValueError(f"{name} = {value} must be {sign}, and {LARGEST:g} at the most.")
         if self.exponent not in EXPONENTS:
             raise ValueError(f"exponent = {self.exponent:g} must be {known_exponents()}.")
         set_frozen(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))
@@ -226,18 +225,8 @@ class MindlinLaw:
         return self.cn > 0 or (self.ct > 0 and self.frictional)
 
     def slip_limit(self, overlap: ArrayLike) -> Floats:
-        """Slip t* at which the tangential force reaches Coulomb's bound.
-
-        Parameters
-        ----------
-        overlap : array_like
-            Overlaps, length.
-
-        Returns
-        -------
-        ndarray
-            t* = mu kn overlap / kt, length; zero for a law without friction.
-        """
+        """Slip t* = mu kn overlap / kt at which the tangential force reaches Coulomb's bound, length; zero without
+        friction."""
         overlap = _closed_overlap(overlap)
         return overlap * self.mu * self.kn / self.kt if self.frictional else np.zeros_like(overlap)
 
@@ -252,15 +241,7 @@ class MindlinLaw:
         return np.clip(np.asarray(slip, dtype=np.result_type(slip, np.float64)), -limit, limit)
 
     def remembered(self, slip: ArrayLike, before: ArrayLike, after: ArrayLike) -> Floats:
-        """Slip of a contact after a monotonic change of its overlap without slipping, length.
-
-        Parameters
-        ----------
-        slip : array_like
-            The slip before the change, length.
-        before, after : array_like
-            Overlaps, length, positive.
-        """
+        """Slip of a contact after a monotonic change of its overlap, both positive, without slipping; length."""
         kept = np.asarray(slip, dtype=np.result_type(slip, np.float64))
         if self.rescales:
             kept = kept * self.growth(np.minimum(np.divide(before, after), 1.0))
@@ -280,19 +261,8 @@ class MindlinLaw:
         return float((force / self.kn) ** (1 / self.exponent))
 
     def tangential_force(self, overlap: ArrayLike, slip: ArrayLike) -> Floats:
-        """Tangential force f_t along tau, force; beyond the slip limit it is Coulomb's bound.
-
-        Parameters
-        ----------
-        overlap, slip : array_like
-            Overlap and slip of each contact, length.
-
-        Returns
-        -------
-        ndarray
-            f_t = -kt overlap^(p-1) (1 + x - x^2) slip, or without the bracket for Coulomb's slider. The force opposes
-            the slip.
-        """
+        """Tangential force f_t along tau of overlaps and slips, which opposes the slip; beyond the slip limit it is
+        Coulomb's bound."""
         overlap = _closed_overlap(overlap)
         slip = self.clamped(overlap, slip)
         spring = -self.kt * self.growth(overlap)
@@ -304,19 +274,9 @@ class MindlinLaw:
     def derivatives(
         self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.5, sliding: ArrayLike = False
     ) -> Derivatives:
-        """Forces and their derivatives; overlaps that are not positive give zeros.
-
-        Parameters
-        ----------
-        overlap, slip : ndarray
-            Overlap and slip of each contact, length.
-        parting : array_like
-            Weight in b of the derivative for a falling overlap. Only for rescaled slips does the derivative for a
-            growing overlap differ.
-        sliding : array_like of bool
-            Which of the contacts at Coulomb's bound continue to slide. Only Coulomb's slider has two derivatives there;
-            by default it sticks.
-        """
+        """Forces and their derivatives; overlaps that are not positive give zeros. `parting` is the weight in b of the
+        derivative for a falling overlap, `sliding` says which contacts at Coulomb's bound continue to slide, of
+        Coulomb's slider."""
         overlap, p = np.maximum(overlap, 0.0), self.exponent
         root = self.growth(overlap)
         rest_power = root if p == 1.5 else np.power(overlap, 2 - p)
@@ -344,21 +304,8 @@ class MindlinLaw:
         return Derivatives(normal_force, soft * (1 + x * rest) * slip, normal_stiffness, a, factor * (-self.kt * steep))
 
     def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
-        """Coefficients of the dashpots for small velocities, force time / length.
-
-        Parameters
-        ----------
-        overlap, slip : array_like
-            Overlap and slip of each contact, length.
-        sliding : array_like of bool
-            As in `derivatives`.
-
-        Returns
-        -------
-        normal, tangential : ndarray
-            cn overlap^(p-1) and ct overlap^(p-1); the tangential one is zero without friction, and where a contact is
-            at Coulomb's bound, unless Coulomb's slider sticks there.
-        """
+        """Coefficients cn overlap^(p-1) and ct overlap^(p-1) of the dashpots, force time / length. The tangential one
+        is zero without friction, and where a contact is at Coulomb's bound, unless Coulomb's slider sticks there."""
         overlap = _closed_overlap(overlap)
         power = self.growth(overlap)
         slides = self.at_bound(overlap, slip)

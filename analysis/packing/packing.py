@@ -41,7 +41,6 @@ from ..arrays import (
 from ..assembly import spring_of_layer
 from ..configuration import Configuration
 from ..counted import counted
-from ..errors import BadInputError
 from .compensated import DoubleDouble
 from .contacts import Contacts
 from .disk_operators import Form, assemble_stiffness, contact_terms
@@ -211,13 +210,7 @@ class Packing(EqualToTheBit):
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The disks with their contacts to first order; BadInputError where numbers overflow."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            steepest = self.law.normal_stiffness(self.geometry.overlap).max(initial=0.0)
-            if not np.isfinite([self.residual, steepest]).all():
-                raise BadInputError(
-                    f"Forces overflow with kn = {self.law.kn:g}: take units in which numbers are smaller."
-                )
+        """The disks with their contacts to first order."""
         g, c, n = self.geometry, self.contacts, len(self)
         flat = np.zeros(len(c))
         arms = np.column_stack([self.radius[c.i], np.where(c.floor, 0.0, self.radius[c.j])])
@@ -303,15 +296,7 @@ class Packing(EqualToTheBit):
         position_low: ArrayLike | None = None,
         fx: float | None = None,
     ) -> "Packing":
-        """The same disks at other positions; only the new values are checked.
-
-        Parameters
-        ----------
-        position, angle, contacts, position_low
-            As for the class.
-        fx : float, optional
-            Force along x on each disk of the upper layer; unchanged by default.
-        """
+        """The same disks at other positions; only the new values are checked. fx is unchanged by default."""
         n = len(self)
         _check_partners(contacts, n)
         return derive_frozen(
@@ -324,28 +309,14 @@ class Packing(EqualToTheBit):
         )
 
     def with_dissipation(self, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> "Packing":
-        """The same equilibrium with dashpots and drag, by default none: they have no part in where a packing rests.
-
-        Parameters
-        ----------
-        cn, ct : float
-            Dashpots of every contact, as of :class:`~faultgouge.analysis.MindlinLaw`.
-        drag_time : float, optional
-            tau of the drag, time; none by default.
-        """
+        """The same equilibrium with dashpots of every contact and drag, by default none: they have no part in where a
+        packing rests."""
         return replace(self, law=replace(self.law, cn=cn, ct=ct), drag_time=drag_time)
 
     def loaded(self, least: float) -> "Packing":
-        """The packing without the contacts whose normal force does not exceed a given force.
-
-        A disk that nothing holds comes to rest barely touching another disk. The overlap, and so the stiffness, is then
-        rounding noise: of order (force / k_n)^(1/3), which is not small.
-
-        Parameters
-        ----------
-        least : float
-            Normal force that a contact must exceed.
-        """
+        """The packing without the contacts whose normal force does not exceed a given one. A disk that nothing holds
+        comes to rest barely touching another: the stiffness of this contact is rounding, of order (force /
+        k_n)^(1/3)."""
         kept, c = self.normal_force > least, self.contacts
         low = None if c.slip_low is None else c.slip_low[kept]
         return self if np.all(kept) else replace(self, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept], low))

@@ -15,10 +15,9 @@ period, and these dips would spoil a straight line through log D. The mean of D 
 the exponential and removes the modulation, whatever its frequency: the rate is the slope of the logarithm of these
 means, over intervals of equal duration.
 
-**Noise.** All modes start with similar amplitudes, excited by the rounding of the coordinates or by the perturbation. D
-stays at this level, the noise, until the fastest growing motion exceeds the noise. With n modes, this motion starts
-with a share of about `NOISE_SHARE`/n. To reach `NOISE_FACTOR` times the noise, and to be followed over a decade from
-there, takes a time of about
+**Noise.** All modes start with similar amplitudes, excited by the rounding of the coordinates or by the perturbation.
+Of n modes the fastest growing one starts with a share of about `NOISE_SHARE`/n. To reach `NOISE_FACTOR` times the
+noise, and to be followed over a decade from there, takes a time of about
 :math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings for 100 disks.
 
 **Weakening.** When friction falls with the velocity, the equilibrium of the packing changes. D jumps to the
@@ -199,9 +198,8 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
         raise ValueError(f"time and msd must be lists of one length, {t.shape} and {d.shape}, and times must increase.")
     first, last = (int(np.argmax(np.append(d >= bound, True))) for bound in (lower, upper))
     if last - first < 2 * STRETCHES:
-        raise ValueError(
-            f"D has {max(last - first, 0)} samples between {lower:g} and {upper:g}; a fit needs {2 * STRETCHES}."
-        )
+        few = f"{max(last - first, 0)} samples between {lower:g} and {upper:g}"
+        raise ValueError(f"D has {few}; a fit needs {2 * STRETCHES}.")
     t, d = t[first:last], d[first:last]
     # means over stretches of equal duration, with straight lines between samples: of an exponential each gives the same
     # multiple of the value at its centre
@@ -221,20 +219,8 @@ def fit_growth(time: ArrayLike, msd: ArrayLike, lower: float, upper: float) -> G
 
 
 def growing_range(time: ArrayLike, msd: ArrayLike, upper: float) -> tuple[float, float]:
-    """Bounds of D between which one motion grows alone.
-
-    Parameters
-    ----------
-    time, msd : array_like, shape (T,)
-        D(t).
-    upper : float
-        Where it ceases to be exponential at the latest, length^2.
-
-    Returns
-    -------
-    tuple of float
-        `NOISE_FACTOR` times the noise, the median of D over the first quarter of its way to `upper`; and `upper`.
-    """
+    """Bounds of D between which one motion grows alone: `NOISE_FACTOR` times the noise, the median of D over the first
+    quarter of its way to `upper`, length^2; and `upper`."""
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     end = t[np.argmax(d >= upper)] if np.any(d >= upper) else t[-1]
     return NOISE_FACTOR * float(np.median(d[t <= t[0] + 0.25 * (end - t[0])])), upper
@@ -302,78 +288,75 @@ def growth_of_run(
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     mu = np.full(len(t), packing.law.mu) if friction is None else np.asarray(friction, dtype=np.float64)
-    weaker, weakened, length, now = mu < packing.law.mu, None, float(t[-1]), f"at F_x = {packing.fx:g}"
-    if weaker.any():
-        weakened = float(mu.min())
+    weakened, length, now = None, float(t[-1]), f"at F_x = {packing.fx:g}"
+    if np.any(mu < packing.law.mu):
+        first, weakened = int(np.argmax(mu < packing.law.mu)), float(mu.min())
         law = replace(packing.law, mu=weakened)
-        packing = replace(
-            packing,
-            law=law,
-            contacts=packing.contacts.slipped(law.clamped(packing.geometry.overlap, packing.contacts.slip)),
-        )
-        t, d = t[int(np.argmax(weaker)) :], d[int(np.argmax(weaker)) :]
+        slips = packing.contacts.slipped(law.clamped(packing.geometry.overlap, packing.contacts.slip))
+        packing = replace(packing, law=law, contacts=slips)
+        t, d = t[first:], d[first:]
         length, now = float(t[-1] - t[0]), f"with the friction weakened to mu = {weakened:.6g}"
-    disks, damped = len(packing), packing.damped
-    rate, pairs, negative, needed = None, 0, 0, None
-    if damped and disks <= DISKS_BY_LAPACK // 2:
-        grows = unstable_rates(packing)
-        rate = 2 * float(grows.real.max(initial=0.0))
-        pairs, negative = int(np.count_nonzero(grows.imag > 0)), int(np.count_nonzero(grows.imag == 0))
-    elif not damped and disks <= DISKS_BY_LAPACK:
-        modes = spectrum(packing)
-        rate, pairs, negative = modes.growth_rate(dt), len(modes.pairs), len(modes.negative)
-    if rate:
-        needed = float(np.log(10 * NOISE_FACTOR * max(1, 3 * disks) / NOISE_SHARE) / rate)
-    fit: Growth | None = None
-    if rate != 0 and len(t) > 1:
-        top = float(d.max())
-        if weakened is not None:
-            bounds = 10 * float(d[t <= t[0] + JUMP_SHARE * (t[-1] - t[0])].max()), 0.1 * top
-        else:
-            # while it still grows in the end, it has not levelled off: the last decade is within the last e-foldings
-            late = t[int(np.argmax(d >= 0.1 * top))]
-            grows_on = rate is not None and (t[-1] - late) * rate < 2 * np.log(10)
-            level = float(np.nextafter(top, np.inf)) if grows_on else PLATEAU_SHARE * top
-            bounds = growing_range(t, d, min((LINEAR_RANGE * packing.smallest_overlap) ** 2, level))
-        try:
-            fit = fit_growth(t, d, *bounds)
-        except ValueError:
-            fit = None
+    rate, pairs, negative = _predicted(packing, dt)
+    needed = float(np.log(10 * NOISE_FACTOR * max(1, 3 * len(packing)) / NOISE_SHARE) / rate) if rate else None
+    fit = _measured(packing, t, d, rate, weakened is not None) if rate != 0 and len(t) > 1 else None
+    enough = None if needed is None else fit is not None or length >= needed
     counts = {"complex pair": pairs, "negative eigenvalue": negative}
     found = " and ".join(counted(count, noun) for noun, count in counts.items() if count) or "no motion"
+    unknown = f"of more than {DISKS_BY_LAPACK} disks the spectrum is not computed."
     if fit is not None:
-        says = (
-            f"D grew at the rate {fit.rate:.6g} +- {fit.error:.1g}, fitted over {fit.decades:.1f} decades, from "
-            f"t = {fit.start:.6g} to {fit.end:.6g}; "
-        )
+        span = f"fitted over {fit.decades:.1f} decades, from t = {fit.start:.6g} to {fit.end:.6g}"
+        says = f"D grew at the rate {fit.rate:.6g} +- {fit.error:.1g}, {span}; "
         if rate is None:
-            says += f"of more than {DISKS_BY_LAPACK} disks no spectrum was computed beside."
+            says += unknown
         else:
-            weak = "" if weakened is None else f" {now}"
-            off = 100 * (fit.rate / rate - 1)
+            weak, off = "" if weakened is None else f" {now}", 100 * (fit.rate / rate - 1)
             says += f"the spectrum, {found}{weak}, predicts {rate:.6g}: a difference of {off:+.2g} %."
     elif rate is None:
-        says = (
-            "D did not grow by a decade above its noise; "
-            f"for more than {DISKS_BY_LAPACK} disks the spectrum is not computed."
-        )
+        says = f"D did not grow by a decade above its noise; {unknown}"
     elif needed is None:
-        none = "no motion grows" if damped else "no complex pair and no negative eigenvalue"
-        loss, jumps = ", dissipation damps all motion" * damped, " jumps to the new equilibrium and" * bool(weakened)
-        says = (
-            f"Nothing grows: {now} the packing is linearly stable ({none}){loss}, and D{jumps} stays bounded, however "
-            "long the run."
-        )
+        none = "no motion grows" if packing.damped else "no complex pair and no negative eigenvalue"
+        loss = ", dissipation damps all motion" if packing.damped else ""
+        jumps = "" if weakened is None else " jumps to the new equilibrium and"
+        says = f"Nothing grows: {now} the packing is linearly stable ({none}){loss}, and D{jumps} stays bounded, "
+        says += "however long the run."
     else:
-        says = f"{now[0].upper()}{now[1:]} the packing is unstable ({found}, rate {rate:.6g}), but " + (
-            f"the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D leaves the noise, "
-            f"and can be followed over a decade, after about t = {needed:.4g}."
-            if length < needed
-            else f"D did not rise by a decade above its noise at one rate: it reached {d.max():.2g} in t = "
-            f"{length:.4g}. The motion is small compared with other motion, or has left the range in which K holds."
-        )
-    enough = None if needed is None else fit is not None or length >= needed
+        says = f"{now[0].upper()}{now[1:]} the packing is unstable ({found}, rate {rate:.6g}), but "
+        if length < needed:
+            says += f"the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D leaves "
+            says += f"the noise, and can be followed over a decade, after about t = {needed:.4g}."
+        else:
+            says += f"D did not rise by a decade above its noise at one rate: it reached {d.max():.2g} in t = "
+            says += f"{length:.4g}. The motion is small compared with other motion, or has left the range in which K "
+            says += "holds."
     return GrowthOfRun(fit, rate, pairs, negative, enough, needed, weakened, says)
+
+
+def _predicted(packing: Packing, dt: float | None) -> tuple[float | None, int, int]:
+    """Growth rate of D, complex pairs and negative eigenvalues, or with dissipation the motions that grow."""
+    if packing.damped and len(packing) <= DISKS_BY_LAPACK // 2:
+        grows = unstable_rates(packing)
+        return 2 * float(grows.real.max(initial=0.0)), int(np.sum(grows.imag > 0)), int(np.sum(grows.imag == 0))
+    if not packing.damped and len(packing) <= DISKS_BY_LAPACK:
+        modes = spectrum(packing)
+        return modes.growth_rate(dt), len(modes.pairs), len(modes.negative)
+    return None, 0, 0
+
+
+def _measured(packing: Packing, t: Floats, d: Floats, rate: float | None, weakened: bool) -> Growth | None:
+    """The fit within the bounds between which one motion grows alone; None if there is none."""
+    top = float(d.max())
+    if weakened:
+        bounds = 10 * float(d[t <= t[0] + JUMP_SHARE * (t[-1] - t[0])].max()), 0.1 * top
+    else:
+        # while it still grows in the end, it has not levelled off: the last decade is within the last e-foldings
+        late = t[int(np.argmax(d >= 0.1 * top))]
+        grows_on = rate is not None and (t[-1] - late) * rate < 2 * np.log(10)
+        level = float(np.nextafter(top, np.inf)) if grows_on else PLATEAU_SHARE * top
+        bounds = growing_range(t, d, min((LINEAR_RANGE * packing.smallest_overlap) ** 2, level))
+    try:
+        return fit_growth(t, d, *bounds)
+    except ValueError:
+        return None
 
 
 def unstable_rates(packing: Packing) -> Complexes:

@@ -51,13 +51,8 @@ class Hysteresis:
 
 
 def layer_displacement(packings: Sequence[Packing]) -> Floats:
-    """Mean displacement (x, y) of the upper layer since the first of some equilibria, length, shape (T, 2).
-
-    Parameters
-    ----------
-    packings : sequence of Packing
-        Equilibria one after the other, all of the same disks; without an upper layer the mean is over all disks.
-    """
+    """Mean displacement (x, y) of the upper layer, or without one of all disks, since the first of some equilibria of
+    the same disks, length, shape (T, 2)."""
     first = packings[0]
     upper = first.top if first.top.any() else np.ones(len(first), dtype=bool)
     moved = [np.zeros(2)]
@@ -76,14 +71,8 @@ def turning_points(fx: Floats) -> list[int]:
 
 
 def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
-    """The displacement and the work that remain when F_x returns; None if F_x did not have its last value before a
-    turning point.
-
-    Parameters
-    ----------
-    packings : sequence of Packing
-        Equilibria one after the other, all of the same disks.
-    """
+    """What remains when F_x returns, of equilibria one after the other; None if F_x did not have its last value before
+    a turning point."""
     fx = np.array([packing.fx for packing in packings])
     turns, begin = turning_points(fx), int(np.argmax(fx == fx[-1]))
     if not any(begin < turn < len(fx) - 1 for turn in turns):

@@ -78,11 +78,6 @@ class NormalForm:
     right, left : ndarray, shape (n, 2)
         V, orthonormal directions of the two coordinates x in mass-weighted coordinates of the packing, and W, with
         W^T V = 1: coordinates of a displacement z are W^T z.
-
-    Raises
-    ------
-    ValueError
-        If delta or epsilon is out of range.
     """
 
     delta: float
@@ -91,25 +86,10 @@ class NormalForm:
     right: Floats = field(default_factory=lambda: np.eye(2), repr=False)
     left: Floats = field(default_factory=lambda: np.eye(2), repr=False)
 
-    def __post_init__(self) -> None:
-        if not 0 < self.delta < 1:
-            raise ValueError(f"delta = {self.delta} must lie between 0 and 1.")
-        if not -np.inf < self.epsilon <= 1:
-            raise ValueError(f"epsilon = {self.epsilon} must be finite and at most 1.")
-
     @classmethod
     def of_block(cls, block: Floats, discriminant: float, right: Floats, left: Floats) -> "NormalForm":
-        """That of A on the plane of two modes.
-
-        Parameters
-        ----------
-        block : ndarray, shape (2, 2)
-            W^T A V, 1 / time^2.
-        discriminant : float
-            Of the characteristic polynomial of the block, 1 / time^4.
-        right, left : ndarray, shape (n, 2)
-            Orthonormal V, and W with W^T V = 1.
-        """
+        """That of A on the plane of two modes: of W^T A V, the discriminant of its characteristic polynomial, and
+        orthonormal V and W with W^T V = 1, shape (n, 2)."""
         mean = 0.5 * (block[0, 0] + block[1, 1])
         # Traceless part: ((-c, k), (k, c)) + q ((0, 1), (-1, 0)); c = p cos 2a, k = -p sin 2a.
         c, (k, q) = 0.5 * (block[1, 1] - block[0, 0]), 0.5 * (block[0, 1] + np.array([1, -1]) * block[1, 0])
@@ -146,24 +126,9 @@ class NormalForm:
         return float(1 / (self.delta * np.sqrt(self.epsilon))) / self.frequency if self.epsilon > 0 else np.inf
 
     def solution(self, time: ArrayLike, damping_time: float | None = None) -> Floats:
-        """The exact motion from rest at a displacement across v*, without forcing.
-
-        Parameters
-        ----------
-        time : array_like, shape (T,)
-            Times.
-        damping_time : float, optional
-            tau; none by default.
-
-        Returns
-        -------
-        ndarray, shape (T, 2)
-            The coordinates x; the displacement of the packing is V x.
-        """
-        return self._solution(np.asarray(time, dtype=float) * self.frequency, self._gamma(damping_time))
-
-    def _solution(self, t: Floats, gamma: float) -> Floats:
-        """The motion in the unit of time of the equations."""
+        """The exact motion x from rest at a displacement across v*, shape (T, 2), with a damping time or without; the
+        displacement of the packing is V x."""
+        t, gamma = np.asarray(time, dtype=float) * self.frequency, self._gamma(damping_time)
         r, s, d = self._rates(gamma)
         # The motion is exp(-gamma t) (cos(St) + gamma sin(St)/S), each as its parts along 1 and along N.
         # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
@@ -217,7 +182,7 @@ class NormalForm:
         time = time[time >= 0]
 
         def size(t: ArrayLike) -> Floats:
-            return np.linalg.norm(self._solution(np.atleast_1d(t), gamma), axis=1)
+            return np.linalg.norm(self.solution(np.atleast_1d(t) / self.frequency, damping_time), axis=1)
 
         best = time[np.argmax(size(time))]
         # Offsets from a late time keep their digits; at a flat maximum, half of them give all digits of the height.

@@ -133,8 +133,7 @@ def linear_response(
     unit = dt or gaps[gaps > 0].min(initial=np.inf)
     # a part in a million of a step is far above the rounding of times that were printed or summed
     steps = np.round(gaps / unit, 6)
-    even = bool(np.all(steps == np.round(steps)))
-    if dt is not None and not even:
+    if dt is not None and np.any(steps != np.round(steps)):
         raise ValueError(f"The times of a run with the step {dt:g} are multiples of it.")
     system = Motion.of(packing)
     active, root, size = system.active, system.root_mass, len(system.active)
@@ -150,23 +149,17 @@ def linear_response(
     damping = np.zeros_like(b)
     damping[:size, :size] = system.damping.toarray()
     first_order = np.block([[0 * one, speed * one], [-b / speed, -damping]])
-    powers, states, by_gap = [], np.empty((len(instants), len(start))), dict[float, Floats]()
+    step = np.zeros_like(first_order)  # of velocity Verlet
     if dt is not None:
         half = one - 0.5 * dt**2 * b
-        powers = [np.block([[half, speed * dt * one], [-dt / speed * b @ (one - 0.25 * dt**2 * b), half]])]
-    elif even and time.any():
-        powers = [expm(instants[-1] / steps.sum() * first_order)]
+        step = np.block([[half, speed * dt * one], [-dt / speed * b @ (one - 0.25 * dt**2 * b), half]])
+    states, ahead = np.empty((len(instants), len(start))), dict[float, Floats]()
     with np.errstate(over="ignore", invalid="ignore"):  # of motions that grow for long
-        for k, ahead in enumerate(steps.tolist()):
-            if not even:
-                if ahead not in by_gap:  # equal gaps differ by rounding
-                    by_gap[ahead] = expm(gaps[steps == ahead].mean() * first_order)
-                start = by_gap[ahead] @ start
-            for bit in range(int(ahead).bit_length() if even else 0):
-                if bit == len(powers):
-                    powers.append(powers[-1] @ powers[-1])
-                start = powers[bit] @ start if int(ahead) >> bit & 1 else start
-            states[k] = start
+        for k, count in enumerate(steps.tolist()):
+            if count not in ahead:  # equal gaps differ by rounding
+                gap = gaps[steps == count].mean()
+                ahead[count] = expm(gap * first_order) if dt is None else np.linalg.matrix_power(step, int(count))
+            states[k] = start = ahead[count] @ start
     displacement, velocity = np.zeros((2, len(time), packing.coordinates))
     displacement[:, active] = states[where, :size] / root
     velocity[:, active] = speed * states[where, size + 1 : 2 * size + 1] / root
@@ -250,19 +243,8 @@ class ImpulseResponse:
         return np.real(np.exp(1j * apart * t) * part.sum() - np.exp(np.multiply.outer(t, self.rate)) @ part)
 
     def largest(self, omega: ArrayLike, duration: float) -> tuple[Floats, Floats]:
-        """The largest |v| up to a time under the force cos(omega t), and when it is reached.
-
-        Parameters
-        ----------
-        omega : array_like, shape (W,)
-            Angular frequencies, 1 / time.
-        duration : float
-            Time from the first push.
-
-        Returns
-        -------
-        velocity, time : ndarray, shape (W,)
-        """
+        """The largest |v| up to a time from the first push under the force cos(omega t), and when it is reached, of
+        each omega."""
         omegas, part = self.parts(omega)
         fastest = max(np.abs(self.rate.imag).max(), omegas.max())
         count = int(np.ceil(duration * fastest / (2 * np.pi) * LOOKS_A_PERIOD)) + 1
@@ -282,15 +264,7 @@ class ImpulseResponse:
 
 
 def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
-    """How the upper layer moves after an impulse.
-
-    Parameters
-    ----------
-    packing : Packing
-        The equilibrium, with its dashpots and drag.
-    force : array_like, shape (3N,)
-        f on (x.., y.., R theta..), as of `layer_force` or `floor_force`.
-    """
+    """How the upper layer moves after an impulse f on (x.., y.., R theta..), as of `layer_force` or `floor_force`."""
     system = Motion.of(packing)
     drive = _coordinates(packing, "force", force)[system.active] / system.root_mass
     mean = np.concatenate([packing.top / max(1, packing.top.sum()), np.zeros(2 * len(packing))])

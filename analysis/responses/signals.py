@@ -4,9 +4,7 @@ A signal is a table of (time, value) with linear interpolation; before the first
 pulse is Ricker's wavelet, the second derivative of a Gaussian (N. Ricker, Geophysics 18, 10, 1953), whose spectrum
 peaks at omega,
 
-.. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) ,
-
-and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that changes linearly from one value to another.
+.. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) .
 
 **Motion of the floor.** In the frame of a rigid floor with the acceleration a(t), the floor is at rest and a force
 :math:`-m a(t)` acts on every disk, exactly. Seismometers record velocities; `derivative` computes accelerations
@@ -27,7 +25,7 @@ ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
 
 ROWS_A_PERIOD = 256
-"""Rows a period of pulses and sweeps: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
+"""Rows a period of pulses: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
 
 
 class SignalError(BadInputError):
@@ -61,29 +59,20 @@ class Signal:
                 f"a signal has two columns of one length with two rows or more, and not the shapes {self.time.shape} "
                 f"and {self.value.shape}: give it a beginning and an end"
             )
-        for name in ("time", "value"):
-            wrong = np.flatnonzero(~np.isfinite(getattr(self, name)))
-            if len(wrong):
-                raise SignalError(
-                    f"row {wrong[0] + 1} of the signal has the {name} {getattr(self, name)[wrong[0]]}: give finite "
-                    "numbers, and fill gaps or cut them off"
-                )
-        late = np.flatnonzero(np.diff(self.time) <= 0)
-        if len(late):
-            row = int(late[0]) + 2
-            raise SignalError(
-                f"the time {self.time[row - 1]:g} in row {row} of the signal is not later than the "
-                f"{self.time[row - 2]:g} before it: sort the rows by time, and leave out double ones"
-            )
+        for name, column in (("time", self.time), ("value", self.value)):
+            for row in np.flatnonzero(~np.isfinite(column))[:1]:
+                what = f"row {row + 1} of the signal has the {name} {column[row]}"
+                raise SignalError(f"{what}: give finite numbers, and fill gaps or cut them off")
+        for row in np.flatnonzero(np.diff(self.time) <= 0)[:1]:
+            late = f"the time {self.time[row + 1]:g} in row {row + 2} of the signal is not later than the "
+            raise SignalError(f"{late}{self.time[row]:g} before it: sort the rows by time, and leave out double ones")
 
     def __len__(self) -> int:
         return len(self.time)
 
     def __repr__(self) -> str:
-        return (
-            f"Signal({len(self)} rows from t = {self.time[0]:g} to {self.time[-1]:g}, "
-            f"|value| <= {np.abs(self.value).max():g})"
-        )
+        most = np.abs(self.value).max()
+        return f"Signal({len(self)} rows from t = {self.time[0]:g} to {self.time[-1]:g}, |value| <= {most:g})"
 
     @property
     def shortest(self) -> float:
@@ -104,28 +93,7 @@ class Signal:
 
 
 def pulse(omega: float) -> Signal:
-    """Ricker's wavelet of height 1 whose spectrum peaks at omega; it begins at t = 0.
-
-    Parameters
-    ----------
-    omega : float
-        Angular frequency, 1 / time.
-    """
+    """Ricker's wavelet of height 1 whose spectrum peaks at omega, 1 / time; it begins at t = 0."""
     time = np.linspace(0.0, 2 * ONSET_OF_PULSE / omega, int(2 * ONSET_OF_PULSE / (2 * np.pi) * ROWS_A_PERIOD))
     squared = (0.5 * (omega * time - ONSET_OF_PULSE)) ** 2
     return Signal(time, (1 - 2 * squared) * np.exp(-squared))
-
-
-def sweep(first: float, last: float, duration: float) -> Signal:
-    """A wave of amplitude 1 whose frequency goes evenly from `first` to `last`; zero at t = 0.
-
-    Parameters
-    ----------
-    first, last : float
-        Angular frequencies, 1 / time.
-    duration : float
-        Length, time.
-    """
-    rows = int(np.ceil(max(first, last) * duration / (2 * np.pi) * ROWS_A_PERIOD)) + 1
-    time = np.linspace(0.0, duration, max(rows, ROWS_A_PERIOD))
-    return Signal(time, np.sin(first * time + 0.5 * (last - first) * time**2 / duration))

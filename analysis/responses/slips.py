@@ -75,20 +75,7 @@ class _Row(NamedTuple):
 
 
 class SlipDetector:
-    """Finds slips while a run goes on, by the rule of this module.
-
-    Parameters
-    ----------
-    velocity : float
-        The fastest velocity of the far end of the spring, length / time.
-    period : float
-        Of the layer on the spring, time.
-
-    Attributes
-    ----------
-    under_way : bool
-        Whether the layer slips.
-    """
+    """Finds slips while a run goes on, by the rule of this module."""
 
     def __init__(self, velocity: float, period: float) -> None:
         self._threshold = SLIP_VELOCITY * abs(velocity)
@@ -100,18 +87,12 @@ class SlipDetector:
         self._energy = self._energy_at_end = 0.0
 
     @property
-    def under_way(self) -> bool:
-        """Whether the layer slips."""
-        return self._begin is not None
-
-    @property
     def so_far(self) -> Slip | None:
         """The slip under way, up to its last fast motion; None between slips."""
-        begin, end = self._begin, self._end
+        (begin, end), energy = (self._begin, self._end), self._energy_at_end
         if begin is None or end is None:
             return None
-        way = end.displacement - begin.displacement
-        return Slip(begin.time, end.time, begin.force, end.force, way, self._energy_at_end)
+        return Slip(begin.time, end.time, begin.force, end.force, end.displacement - begin.displacement, energy)
 
     @property
     def undecided(self) -> set[float]:
@@ -158,25 +139,8 @@ def find_slips(
     velocity: float,
     period: float,
 ) -> tuple[list[Slip], Slip | None]:
-    """Find the slips in the series of a driven run.
-
-    Parameters
-    ----------
-    time, force, displacement, kinetic_energy : array_like, shape (S,)
-        Columns of the series: time, force of the spring on each disk of the layer, mean displacement of the layer, and
-        kinetic energy of all disks.
-    velocity : float
-        The fastest velocity of the far end, length / time.
-    period : float
-        Of the layer on the spring, time.
-
-    Returns
-    -------
-    list of Slip
-        Those that have ended.
-    Slip or None
-        The one that is under way at the end of the series, as far as it has come.
-    """
+    """Find the slips in the series of a driven run, with the fastest velocity of the far end and the period of the
+    layer on the spring: those that have ended, and the one that is under way at the end, as far as it has come."""
     detector = SlipDetector(velocity, period)
     columns = [np.asarray(column, dtype=np.float64).tolist() for column in (time, force, displacement, kinetic_energy)]
     ended = [slip for row in zip(*columns, strict=True) if (slip := detector.add(*row)) is not None]

@@ -40,7 +40,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import eig, eigh
+from scipy.linalg import eig, eigvalsh
 from scipy.sparse.linalg import svds
 
 from ..arrays import Complexes, Floats, Indices
@@ -245,7 +245,9 @@ def _gain(packing: HasConfiguration, system: Motion, norm: Norm, whole: Propagat
         raise NoGainError("two motions are about to coalesce, where the gain has no digits: take a load a little below")
     scale = np.sqrt(sizes[1] / sizes[0])
     balanced = Propagator(whole.outward * scale, whole.rates, whole.inward / scale[:, None]).real_parts()
-    bound = _norm_squared(balanced[0]) * _norm_squared(balanced[1])
+    bound = float(
+        np.prod([eigvalsh(each @ each.T if each.shape[0] < each.shape[1] else each.T @ each)[-1] for each in balanced])
+    )
     (displacement, velocity), size, time, length = np.zeros((2, packing.coordinates)), 0.0, 0.0, 0.0
     if bound >= 1 + LEAST_EXCESS:
         modes = _sampled_modes(sizes[0] * sizes[1] / (2 if norm == "energy" else 1), balanced[0].shape[1] > len(scale))
@@ -262,12 +264,6 @@ def _gain(packing: HasConfiguration, system: Motion, norm: Norm, whole: Propagat
         displacement[system.active] = system.energy_norm.unweight @ start[:count] / root
         velocity[system.active] = start[count:] / root
     return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension, linear)
-
-
-def _norm_squared(matrix: Floats) -> float:
-    """The 2-norm squared of a matrix, from the smaller of its products with itself."""
-    square = matrix.T @ matrix if matrix.shape[0] >= matrix.shape[1] else matrix @ matrix.T
-    return float(eigh(square, eigvals_only=True, subset_by_index=(len(square) - 1, len(square) - 1))[0])
 
 
 def _sampled_modes(weight: Floats, complex_modes: bool) -> Indices:

@@ -49,21 +49,8 @@ Measured = tuple[float, float, str]
 
 
 class Case(NamedTuple):
-    """Something to try.
-
-    Attributes
-    ----------
-    group : str
-        The kind of trouble.
-    name : str
-        What is tried.
-    run : callable
-        Collective over the ranks, with the same result on each: what was measured.
-    quick : bool
-        Whether it belongs to the small part of the cases.
-    refusal : str
-        Words of the sentence of one line with which it must be refused; empty where it must hold.
-    """
+    """Something to try: `run` is collective over the ranks, with the same result on each. The quick cases are a small
+    part. `refusal` has words of the sentence of one line with which it must be refused; empty where it must hold."""
 
     group: str
     name: str

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.sparse import csc_array, diags_array, eye_array, kron
+from scipy.sparse import block_diag, csc_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import SuperLU, splu
 
 from faultgouge.analysis.factors import sparse_lu
@@ -80,6 +80,13 @@ def test_general_factors_of_a_matrix_without_a_diagonal():
         found = general_lu(skew).solve(right, trans)
         # pivots of a hundredth cost two digits
         assert np.linalg.norm(turned @ found - right) < 1e-10 * np.linalg.norm(found)
+
+
+def test_general_factors_of_a_matrix_with_a_small_pivot():
+    """Without other pivots nine digits would be lost."""
+    matrix = csc_array(block_diag([[[1e-9, 1.0], [1.0, 1.0]]] * 20))
+    right = np.random.default_rng(3).standard_normal(40)
+    assert np.linalg.norm(matrix @ general_lu(matrix).solve(right) - right) < 1e-13 * np.linalg.norm(right)
 
 
 @pytest.mark.parametrize("ordered", [False, True])

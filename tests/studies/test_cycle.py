@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
+from faultgouge.analysis.responses.slips import Slip
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError
 from faultgouge.pywrap.runs.drive import SERIES, settle_for_drive
 from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, with_spring
@@ -135,10 +136,15 @@ def test_motions_of_many_lone_disks_do_not_hide_a_motion_of_two():
     assert beside["damped_sticking"] == pytest.approx(alone["damped_sticking"], rel=1e-6)
 
 
-def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgouge_here):
+def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgouge_here, monkeypatch):
+    slip = Slip(begins=15.0, ends=30.0, force_before=1.0, force_after=0.5, slip=1e-3, kinetic_energy=1e-6)
+    monkeypatch.setattr("faultgouge.studies.cycle.slips_in", lambda file: ([slip], None))
     said = faultgouge_here("modes", slow, "-o", "cycle").stdout
-    count = len(json.loads((tmp_path / "cycle" / "cycle.json").read_text())["states"])
-    assert f"{count} states" in said
+    states = json.loads((tmp_path / "cycle" / "cycle.json").read_text())["states"]
+    assert f"{len(states)} states" in said
+    # the table has the last state before the slip, of the times 0, 10 and 20
+    assert f"{states[1]['force']:.4g}" in said
+    assert f"{states[2]['force']:.4g}" not in said
     found = json.loads(faultgouge_here("spectrum", slow, "--frame", "0", "--json").stdout)
     assert found["spring"] == SPRING
     with RunFile(slow) as file:

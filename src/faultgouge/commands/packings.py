@@ -62,6 +62,7 @@ def stability(
     rise: Annotated[Literal["fx"] | None, Option(help=OF_RISE)] = None,
     followed: Annotated[float | None, Option("--time", metavar="T", help="How long motion is followed.")] = None,
     follow: Follow = False,
+    relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,
     output: Annotated[Path, Option("-o", "--output", hidden=True)] = Path("stability"),
     quick: Annotated[bool, Option("--quick", hidden=True)] = False,
@@ -88,11 +89,13 @@ def stability(
         if is_root():
             found.append(verdict_of(packing, rise, followed, follow=going_on))
 
+    if relax and not is_deck(file):
+        raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
     if not is_deck(file):
         judge(follow, stored_packing(refuse_scene(file), frame))
     else:
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
-            packing = run_deck(file, show=show, use=judge if follow else None)
+            packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:
             judge(False, packing)
     for verdict in found:
