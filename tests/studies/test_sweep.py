@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,8 +75,9 @@ def test_what_settles_alike_and_where_a_seed_is_several_packings(axes, packing, 
 def test_an_overburden_that_varies_is_a_load_that_does():
     sweep = Sweep.from_toml(SWEEPS / "depth.toml")
     assert other_packings(sweep) is None  # settled at one load
-    loads = [point.scene.load.fy for point in sweep.points[::20]]
-    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
+    sweep = replace(sweep, axes=sweep.axes | {"packing.seed": [1]})
+    loads = np.array([point.scene.load.fy for point in sweep.points])
+    assert loads / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
 
 
 @pytest.mark.parametrize(("mapping", "says"), rows_of("studies/refused_sweeps.txt"))
