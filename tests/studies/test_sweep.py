@@ -9,6 +9,7 @@ import signal
 import subprocess
 import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -146,10 +147,10 @@ def test_failures_are_rows_and_merge_tells_what_is_missing(tmp_path):
 def test_the_picture_has_a_curve_for_each_value(tmp_path, monkeypatch):
     drawn, known = [], {mu: np.random.default_rng(1).uniform(0, 0.04, 20) for mu in (0.5, 0.8)}
     rows = [{"values": {}, "result": {"ramps": 3}}]
-    for mu, onsets in known.items():
-        for seed, fx in enumerate(onsets.tolist()):
-            result = {"ends": "onset", "fx_c": fx} if fx < 0.03 else {"ends": "until", "reach": 0.03}
-            rows.append({"values": {"law.mu": mu, "packing.seed": seed}, "result": result})
+    for mu, seed in product(known, range(20)):
+        fx = float(known[mu][seed])
+        result = {"ends": "onset", "fx_c": fx} if fx < 0.03 else {"ends": "until", "reach": 0.03}
+        rows.append({"values": {"law.mu": mu, "packing.seed": seed}, "result": result})
     monkeypatch.setattr("faultgouge.studies.sweep.draw.save", lambda figure, stem: drawn.append(figure))
     assert draw_sweep(rows, tmp_path, print).endswith("results.png")
     (axes,) = drawn[0].axes
@@ -202,12 +203,10 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
     scene, found = SMALL | more | {"eruptions": {"load": [0.02], "time": 1.0}}, {}
     for task in ("trigger", "eruptions"):
         wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene})
-        found[task] = run_sweep(wanted, tmp_path / task, say=id)
-    assert draw_sweep(found["trigger"], tmp_path, print).endswith("results.png")
-    (predicted,), (run,) = found["trigger"][0]["result"]["map"], found["eruptions"][0]["result"]["runs"]
-    assert predicted["predicted"] > 0
-    assert run["fx"] == 0.02
-    assert run["msd"] > 0
+        (row,) = run_sweep(wanted, tmp_path / task, say=id)
+        found[task] = row["result"]
+    assert found["trigger"]["map"][0]["predicted"] > 0
+    assert found["eruptions"]["runs"][0]["fx"] == 0.02
 
 
 def stripped(rows):
