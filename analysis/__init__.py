@@ -46,7 +46,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     )
     from .motion.stability import Stability, stability
     from .motion.stable_timestep import rayleigh_timestep, stable_timestep
-    from .operators.damping import damping_matrix, largest_damping_rate
+    from .operators.damping import damping_matrix
     from .operators.stiffness import stiffness_matrix
     from .packing.contacts import FLOOR, Contacts
     from .packing.geometry import ContactGeometry, nearest_image, touching
@@ -76,7 +76,7 @@ __all__ = [
     "RunFile", "Signal", "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Window",
     "closest_to_meeting", "complex_windows", "damping_matrix", "discrete_frequency", "dispersion", "dynamical_matrix",
     "eigenvalues", "elastic_moduli", "fastest_growing", "find_onset", "fit_growth", "fit_power_law", "growth_of_run",
-    "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force", "linear_response", "lost_by_modes",
+    "growth_rate", "largest_frequency", "layer_force", "linear_response", "lost_by_modes",
     "lost_energy", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
     "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep", "read_dump",
     "softness", "solid_fraction", "spectrum", "spheres_of_material", "stability", "stable_timestep",

@@ -268,11 +268,10 @@ class Configuration(EqualToTheBit):
     @property
     def joined(self) -> Indices:
         """Indices of the particles that move as one with others."""
-        if self.constraint is None:
+        if self._summing is None:
             return np.zeros(0, dtype=np.intp)
-        moved = self.constraint.tocoo()
-        shared = np.bincount(moved.col, minlength=moved.shape[1])[moved.col] > 1
-        return np.unique(moved.row[shared] % len(self))
+        shared = self._summing @ (self._summing.sum(axis=0) > 1)
+        return np.unique(np.flatnonzero(shared) % len(self))
 
     @cached_property
     def _summing(self) -> csr_array | None:

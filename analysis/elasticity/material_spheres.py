@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Indices
+from ..arrays import Floats, Indices, derive_frozen, ratio
 from ..configuration import UNKNOWN_SLIPS, Configuration
 from ..contacts import LinearisedContacts
 from ..errors import BadInputError
@@ -170,10 +170,7 @@ def spheres_of_material(
     known = "tangential_force" in forces or not material.friction or not len(i)
     none = np.zeros((len(i), 3))
     tangential = np.asarray(forces.pop("tangential_force", none), float)
-    grows = hertz and material.rescales > 0
-    coupling = (
-        np.divide(tangential, 2 * overlap[:, None], out=none.copy(), where=overlap[:, None] > 0) if grows else none
-    )
+    coupling = ratio(tangential, 2 * overlap[:, None]) if hertz and material.rescales > 0 else none
     arms = np.column_stack([radius[i], np.where(wall, 0.0, radius[j])])
     given: dict[str, Any] = {
         "i": i, "j": j, "normal": normal, "distance": np.where(wall, np.inf, distance), "overlap": overlap,
@@ -182,14 +179,12 @@ def spheres_of_material(
         "parting": coupling, "friction": material.friction * np.maximum(normal_force, 0.0),
         "normal_dashpot": dashpots[0], "tangential_dashpot": dashpots[1],
     }  # fmt: skip
-    made = LinearisedContacts(**given | forces)
-    whole = {
-        "dimension": dimension, "position": place[:, :dimension], "radius": radius, "mass": mass,
-        "inertia": 0.4 * mass * radius**2, "contacts": made, "box": box, "origin": origin, "periodic": periodic,
-        "slips_known": known, "remarks": () if known else (UNKNOWN_SLIPS,),
-    }  # fmt: skip
-    load = -Configuration(**whole, load=np.zeros((len(radius), 2, 3))).contact_force
-    return Configuration(**whole, load=load)
+    made = Configuration(
+        dimension=dimension, position=place[:, :dimension], radius=radius, mass=mass, inertia=0.4 * mass * radius**2,
+        contacts=LinearisedContacts(**given | forces), box=box, origin=origin, periodic=periodic, slips_known=known,
+        load=np.zeros((len(radius), 2, 3)), remarks=() if known else (UNKNOWN_SLIPS,),
+    )  # fmt: skip
+    return derive_frozen(made, load=-made.contact_force)
 
 
 def timestep_rules(configuration: Configuration) -> tuple[StableTimestep, dict[str, float | None]]:
@@ -206,14 +201,10 @@ def timestep_rules(configuration: Configuration) -> tuple[StableTimestep, dict[s
         one spring could take; `p_wave`: :math:`R \sqrt{\rho/E}`, the time of a sound wave through the smallest sphere
         of a material (YADE's PWaveTimeStep). None where a rule does not apply.
     """
-    c, free = configuration.contacts, configuration.free
-    touch = np.intersect1d(np.union1d(c.i, c.j[~c.wall]), np.flatnonzero(free))
+    c = configuration.contacts
+    touch = np.intersect1d(np.union1d(c.i, c.j[~c.wall]), np.flatnonzero(configuration.free))
     stiffest = float(np.maximum(c.normal_stiffness, c.tangential_stiffness).max(initial=0.0))
     root = float(np.sqrt(configuration.mass[touch].min() / stiffest)) if stiffest and len(touch) else None
-    rayleigh = rayleigh_timestep(configuration)
-    return stable_timestep(configuration), {
-        "rayleigh": rayleigh,
-        "o_sullivan_bray": None if root is None else 0.17 * root,
-        "oscillator": None if root is None else 2.0 * root,
-        "p_wave": None if root is None else float(np.sqrt(3 / (4 * np.pi))) * root,
-    }
+    shares = {"o_sullivan_bray": 0.17, "oscillator": 2.0, "p_wave": float(np.sqrt(3 / (4 * np.pi)))}
+    rules = {name: None if root is None else share * root for name, share in shares.items()}
+    return stable_timestep(configuration), {"rayleigh": rayleigh_timestep(configuration)} | rules

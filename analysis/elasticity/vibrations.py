@@ -29,7 +29,7 @@ H. Tanaka and A. Lemaitre, Nature Mater. 15, 1177, 2016).
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eig
@@ -162,8 +162,8 @@ def _of_all_modes(c: Configuration, a: csr_array, g: csr_array, moments: int) ->
     weights = np.array([np.ones(len(some)), modes["rotation"], np.nan_to_num(modes["damping"])])
     series = weights @ np.cos(np.outer(angle, np.arange(moments)))
     negative = int(np.sum(values.real < -least))
-    zero = c.coordinates - len(some) - negative
-    return _seen(series[:, None] / len(some), modes, top, len(some), zero, negative)
+    counts = {"counted": len(some), "zero": c.coordinates - len(some) - negative, "negative": negative}
+    return _seen(series[:, None] / len(some), top, modes=modes, **counts)
 
 
 def _of_vectors(c: Configuration, a: csr_array, g: csr_array, moments: int, vectors: int) -> Vibrations:
@@ -191,12 +191,11 @@ def _of_vectors(c: Configuration, a: csr_array, g: csr_array, moments: int, vect
     if np.any(np.abs(series[0]) > 1.5 * series[0, :, :1]):  # a Chebyshev polynomial grows outside of [-1, 1] alone
         raise BadInputError("A motion has a negative eigenvalue: the packing leaves its place; see `stability`.")
     counted = int(moves.sum()) - len(free)
-    return _seen(series / counted, None, float(np.sqrt(bound)), counted, size - counted, 0)
+    names = {"modes": None, "counted": counted, "zero": size - counted, "negative": 0}
+    return _seen(series / counted, float(np.sqrt(bound)), **names)
 
 
-def _seen(
-    series: Floats, modes: dict[str, Floats] | None, top: float, counted: int, zero: int, negative: int
-) -> Vibrations:
+def _seen(series: Floats, largest: float, **more: Any) -> Vibrations:
     """g, rotation and damping of moments, shape (3, vectors, N), through Jackson's window."""
     moments = series.shape[-1]
     n, turn = np.arange(moments), np.pi / (moments + 1)
@@ -207,12 +206,11 @@ def _seen(
     whole, rotation, damping = by_angle.mean(axis=1)
     seen = whole > 1e-3 * whole.mean()  # elsewhere a share is rounding over rounding
     share, loss = (np.divide(each, whole, out=np.full(moments, np.nan), where=seen) for each in (rotation, damping))
-    stretch = 2 / (top * np.cos(angle / 2))
+    stretch = 2 / (largest * np.cos(angle / 2))
     error = np.std(by_angle[0], axis=0, ddof=1) / np.sqrt(len(by_angle[0])) if len(by_angle[0]) > 1 else 0 * whole
-    resolution = np.pi / (moments * stretch)
     return Vibrations(
-        top * np.sin(angle / 2), resolution, whole * stretch, error * stretch, share, loss, modes, top, counted, zero,
-        negative,
+        frequency=largest * np.sin(angle / 2), resolution=np.pi / (moments * stretch), density=whole * stretch,
+        density_error=error * stretch, rotation=share, damping=loss, largest=largest, **more,
     )  # fmt: skip
 
 

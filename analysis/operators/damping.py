@@ -18,12 +18,9 @@ velocity: the force stays at the bound if the contact continues to slide, and th
 back. C uses the first case, as the stability operator does for the slip of such a contact.
 """
 
-import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import eigs
+from scipy.sparse import csr_array
 
-from ..arrays import derive_frozen
 from ..has_configuration import HasConfiguration
 
 
@@ -44,21 +41,3 @@ def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
     return packing.assembled_damping(sliding)
-
-
-def largest_damping_rate(packing: HasConfiguration) -> float:
-    """Largest eigenvalue of M^-1 C of the dashpots without drag, 1 / time; 0 without dashpots.
-
-    Parameters
-    ----------
-    packing : Packing or Configuration
-        The configuration.
-    """
-    matrix = damping_matrix(derive_frozen(packing.configuration, drag_rate=0.0))
-    if matrix.nnz == 0:
-        return 0.0
-    scale = diags_array(1 / np.sqrt(packing.coordinate_mass))
-    # a fixed start makes the result the same on every rank
-    weighted, start = scale @ matrix @ scale, np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
-    # arms of torques that are not those of slips leave C not symmetric
-    return float(eigs(weighted, 1, which="LR", v0=start, return_eigenvectors=False)[0].real)

@@ -112,13 +112,12 @@ Only this module and mindlin_law.h contain the law. See docs/howto_law.md for ho
 """
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Booleans, Floats, ratio, set_frozen
+from ..arrays import LARGEST, Booleans, Floats, ratio, set_frozen
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit
@@ -192,9 +191,9 @@ class MindlinLaw:
         for name in ("kn", "kt", "mu", "exponent", "cn", "ct"):
             value = float(getattr(self, name))
             set_frozen(self, **{name: value})
-            if not isfinite(value) or value < 0 or (name == "kn" and value == 0):
+            if not 0 <= value <= LARGEST or (name == "kn" and value == 0):
                 sign = "positive" if name == "kn" else "not negative"
-                raise ValueError(f"{name} = {value} must be finite and {sign}.")
+                raise ValueError(f"{name} = {value} must be {sign}, and {LARGEST:g} at the most.")
         if self.exponent not in EXPONENTS:
             raise ValueError(f"exponent = {self.exponent:g} must be {known_exponents()}.")
         set_frozen(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))

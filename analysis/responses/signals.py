@@ -4,9 +4,7 @@ A signal is a table of (time, value) with linear interpolation; before the first
 pulse is Ricker's wavelet, the second derivative of a Gaussian (N. Ricker, Geophysics 18, 10, 1953), whose spectrum
 peaks at omega,
 
-.. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) ,
-
-and a sweep :math:`s(t) = \sin\phi(t)` has a frequency :math:`\dot\phi` that changes linearly from one value to another.
+.. math:: s(t) = (1 - 2 x^2) e^{-x^2}, \qquad x = \tfrac12 \omega (t - t_0) .
 
 **Motion of the floor.** In the frame of a rigid floor with the acceleration a(t), the floor is at rest and a force
 :math:`-m a(t)` acts on every disk, exactly. Seismometers record velocities; `derivative` computes accelerations
@@ -27,7 +25,7 @@ ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
 
 ROWS_A_PERIOD = 256
-"""Rows a period of pulses and sweeps: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
+"""Rows a period of pulses: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
 
 
 class SignalError(BadInputError):
@@ -99,10 +97,3 @@ def pulse(omega: float) -> Signal:
     time = np.linspace(0.0, 2 * ONSET_OF_PULSE / omega, int(2 * ONSET_OF_PULSE / (2 * np.pi) * ROWS_A_PERIOD))
     squared = (0.5 * (omega * time - ONSET_OF_PULSE)) ** 2
     return Signal(time, (1 - 2 * squared) * np.exp(-squared))
-
-
-def sweep(first: float, last: float, duration: float) -> Signal:
-    """A wave of amplitude 1 whose frequency goes evenly from `first` to `last`, 1 / time; zero at t = 0."""
-    rows = int(np.ceil(max(first, last) * duration / (2 * np.pi) * ROWS_A_PERIOD)) + 1
-    time = np.linspace(0.0, duration, max(rows, ROWS_A_PERIOD))
-    return Signal(time, np.sin(first * time + 0.5 * (last - first) * time**2 / duration))

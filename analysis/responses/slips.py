@@ -87,11 +87,6 @@ class SlipDetector:
         self._energy = self._energy_at_end = 0.0
 
     @property
-    def under_way(self) -> bool:
-        """Whether the layer slips."""
-        return self._begin is not None
-
-    @property
     def so_far(self) -> Slip | None:
         """The slip under way, up to its last fast motion; None between slips."""
         (begin, end), energy = (self._begin, self._end), self._energy_at_end

@@ -187,7 +187,7 @@ def test_contacts_that_slide_or_are_open_have_no_dashpots(exponent):
 @pytest.mark.parametrize(
     ("field", "values"),
     [
-        ("kn", (0.0, -1.0, np.nan)),
+        ("kn", (0.0, -1.0, np.nan, 1e300)),
         ("kt", (-1.0, np.inf)),
         ("mu", (-0.1,)),
         ("exponent", (1.25, 0.0, np.nan)),

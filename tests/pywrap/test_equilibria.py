@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_layer import REFERENCE
 
-from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
+from faultgouge.analysis import damping_matrix, largest_frequency, stable_timestep
 from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, SceneError, equilibrate, ramp, reach
 from faultgouge.pywrap.runs.undamped import time_step
@@ -116,9 +116,8 @@ def test_equilibria_are_the_same_to_the_bit_and_time_steps_stay_below_what_dashp
     for a, b in zip(plain, damped, strict=True):
         assert a.packing == replace(b.packing, law=a.packing.law, drag_time=None)
     packing = damped[0].packing
-    rate = largest_damping_rate(packing)
     dense = damping_matrix(packing).toarray() - np.eye(60) / packing.drag_time  # masses and I0 are 1
-    assert rate == pytest.approx(np.linalg.eigvalsh(dense).max(), rel=1e-10)
+    rate = np.linalg.eigvalsh(dense).max()
     longest = 20 * time_step(packing)
     # the fastest vibration and the strongest dashpots bound the limit, and are no one motion
     both = rate * longest + (longest / stable_timestep(largest_frequency(packing))) ** 2

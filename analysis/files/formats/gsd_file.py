@@ -40,27 +40,26 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     with hoomd.open(str(path), "r") as file:
         counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
         shown = file[choose_frame(path, counts, frame)]
-    log, particles, box = shown.log, shown.particles, shown.configuration.box
-    columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
-    columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
+    log, particles = shown.log, shown.particles
     type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
+    columns = {key.removeprefix(OWN_QUANTITIES): log[key] for key in log if key.startswith(OWN_QUANTITIES)}
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
         period, rows = values.get("box_length"), log.get(CONTACTS)
-        edges = None if period is None else np.diag([float(period), 1.0, 1.0])
+        box = None if period is None else np.diag([float(period), 1.0, 1.0])
         more = read_back(path, values, None if rows is None else rows[rows[:, 0] > 0], "x_low" in columns)
-        return particles_of(path, columns, edges, type_names=type_names, **more)
-    if particles.diameter is None or not particles.N:
+    elif particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
-    given = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
-    given |= dict(zip("xyz", particles.position.T, strict=True))
-    columns = {name: np.asarray(column, dtype=np.float64) for name, column in given.items()}
-    turn = np.asarray(particles.orientation, dtype=np.float64)
-    columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
-    x, y, z, xy, xz, yz = (float(each) for each in box)
-    edges = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
-    corner = -0.5 * edges.sum(axis=0)
-    return particles_of(path, columns, edges, type_names=type_names, origin=corner, remark=GSD_PRECISION)
+    else:
+        columns = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
+        columns |= dict(zip("xyz", particles.position.T, strict=True))
+        turn = np.asarray(particles.orientation, dtype=np.float64)
+        columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
+        x, y, z, xy, xz, yz = (float(each) for each in shown.configuration.box)
+        box = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
+        more = {"origin": -0.5 * box.sum(axis=0), "remark": GSD_PRECISION}
+    numbers = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
+    return particles_of(path, numbers, box, type_names=type_names, **more)
 
 
 def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -69,8 +68,8 @@ def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, (_, exported) in enumerate(frames):
             frame = hoomd.Frame()
-            _fill(frame, exported)
             frame.configuration.step = number
+            _fill(frame, exported)
             file.append(frame)
     return f"{GSD_PRECISION}; the logged quantities are in float64, and import takes those of a packing of disks"
 

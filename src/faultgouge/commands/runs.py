@@ -120,10 +120,8 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     with RunFile(output) as file:
         columns = {name: file.observable(name).tolist() for name in ("fx", "residual", "floor", "evaluations")}
         numbers, turns = range(len(file)), len(scene.ramp.turning_points) > 1
-        columns |= {
-            "contacts": [len(file.packing(k).contacts) for k in numbers],
-            "way": [*map(fallbacks(file).get, numbers)],
-        }
+        columns["contacts"] = [len(file.packing(k).contacts) for k in numbers]
+        columns["way"] = [*map(fallbacks(file).get, numbers)]
         left = hysteresis([file.packing(k) for k in numbers]) if turns else None
     fx = columns["fx"][-1]
     if fx == loads[-1]:

@@ -48,7 +48,7 @@ def test_detector_finds_the_same_while_the_run_goes_on():
             assert row[0] - slip.ends == pytest.approx(2 * PERIOD, abs=1.5 * EVERY)
             found.append(slip)
             assert find_slips(*zip(*rows[: k + 1], strict=True), VELOCITY, PERIOD)[0] == found
-            assert not detector.under_way
+            assert detector.so_far is None
     assert len(found) == len(SLIPS)
 
 
