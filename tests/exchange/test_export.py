@@ -243,6 +243,8 @@ def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses
         np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
         assert exact.data["position"].dtype == np.float64
         np.testing.assert_array_equal(exact.data["position"][:, :2], place[k])
+        if packing.compensated and k:
+            np.testing.assert_array_equal(exact.data["position_low"], series["position_low"][k - 1])
 
 
 def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
