@@ -123,17 +123,16 @@ def write_view(
         "edge": EDGE,
         "ink": INK,
         "wall": FLOOR,
-        "extent": [np.min([each.low for each in images], axis=0).tolist(),
-                   np.max([each.high for each in images], axis=0).tolist()],
+        "extent": [np.min([e.low for e in images], axis=0).tolist(), np.max([e.high for e in images], axis=0).tolist()],
         "periodic": images[0].periodic,
         "walls": [dict(zip(("axis", "sign", "place"), plane, strict=True)) for plane in first.planes],
         "corners": images[0].corners.tolist(),
     }  # fmt: skip
-    own, walled = first.configuration, bool(first.planes) or not first.configuration.free.all()
+    walled = bool(first.planes) or not first.configuration.free.all()
     kinds = {
         "Yellow: upper layer.": first.top.any(),
         "Red: walls, and particles that are held.": walled and not first.top.any(),
-        "White: rattlers, which touch nothing.": len(own.rattlers),
+        "White: rattlers, which touch nothing.": len(first.rattlers),
         "Drag to turn.": first.dimension == 3,
         "Width of a bar: normal force.": True,
     }

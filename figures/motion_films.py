@@ -238,8 +238,7 @@ def film_of_ramp(
     artist = PackingArtist(axes, packings[-1], color, 2 * first.radius.max(), points)
     disks, chains, view = artist.disks, artist.chains, View.of(first)
     widest = max(each.normal_force.max(initial=0.0) for each in packings) or 1.0
-    coloured = chains.get_array() is not None
-    if coloured:
+    if coloured := chains.get_array() is not None:
         bar = figure.colorbar(chains, ax=axes, shrink=0.6, aspect=28, pad=0.02, location="left")
         bar.set_label(COLOURS[color][0])
     axes.set(xlim=(view.low[0], view.high[0]))

@@ -259,8 +259,8 @@ def _draw_load(axes: Axes, packing: HasConfiguration, view: View) -> None:
     x, y = packing.position[packing.top].T
     x = x % packing.box_length if packing.box_length else x
     crest, length = y + packing.radius[packing.top], 1.2 * packing.radius.max()
-    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 5, "color": INK, "width": 0.006}
-    style |= {"clip_on": False, "in_layout": False}
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 5, "color": INK}
+    style |= {"width": 0.006, "clip_on": False, "in_layout": False}
     highest, middle = np.argmax(crest), 0.5 * (view.low[0] + view.high[0])
     if packing.fy:
         axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)

@@ -277,8 +277,7 @@ def lock_output(path: Path) -> Iterator[None]:
         except OSError as error:  # another has it, or there are no locks on this file system
             held = not isinstance(error, BlockingIOError | FileNotFoundError)
         if not held:
-            says = "another run is writing it: wait for its end, or give another name"
-            raise OutputError(f"{path} cannot be written, since {says}.")
+            raise OutputError(f"{path} cannot be written, since another run is writing it: give another name, or wait.")
         yield
     finally:
         if held:
@@ -326,11 +325,12 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
     if header.startswith(HDF5):
         raise PackingFileError(f"{path} is an HDF5 file, and no run of faultgouge.")
     if not header.startswith(SEAL):
-        convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
+        convert = f"`faultgouge import {path} -o packing.h5` converts files of other codes"
         raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
     if header != _header(image):
-        says = f"{path} is damaged: its {len(image)} bytes do not have the checksum that was written with them"
-        raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
+        raise PackingFileError(
+            f"{path} is damaged: its {len(image)} bytes do not have the checksum: take a copy of it."
+        )
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     with telling(path, "is damaged, or is none of this program's files"):
         file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW if writable else 0))

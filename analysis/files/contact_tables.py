@@ -173,8 +173,8 @@ def read_contacts(
         found, lacks = other, flipped
         remarks = ["tangential forces are those on the second particle: with the other sign they do not balance"]
     if lacks > AT_REST:
-        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
-        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
+        cure = "it does not rest, or a contact or a wall is missing"
+        raise PackingFileError(f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force: {cure}.")
     remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
     return derive_frozen(found, remarks=tuple(remarks))
 

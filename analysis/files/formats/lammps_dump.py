@@ -192,8 +192,7 @@ def _columns(path: Path, frame: DumpFrame, *needed: str, absent: Sequence[str] =
     columns = dict(zip(frame.columns, frame.rows.T, strict=True))
     found = {name: np.zeros(len(frame.rows)) for name in needed if name in absent} | standard_names(columns)
     for name in (each for each in needed if each not in found):
-        has = ", ".join(frame.columns)
-        raise PackingFileError(f"{path} has no column {name} (its columns: {has}).")
+        raise PackingFileError(f"{path} has no column {name} (its columns: {', '.join(frame.columns)}).")
     return found
 
 

@@ -29,8 +29,7 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
     words = values.get("Properties", "").lower().split(":")
     if len(words) < 3:
-        where = f"{path}, line {begin + 2}"
-        raise PackingFileError(f"{where}: it has no Properties=..., so that this is no extended XYZ file.")
+        raise PackingFileError(f"{path}, line {begin + 2}: it has no Properties=..., as extended XYZ has.")
     # components of a vector other than the position are numbered; a column of text has no name
     names, place = list[str | None](), None
     for name, kind, size in zip(words[::3], words[1::3], words[2::3], strict=False):
