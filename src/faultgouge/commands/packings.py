@@ -290,9 +290,10 @@ def vibrations(
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
-    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_spheres
+    from faultgouge.analysis.files.contact_tables import material_of, of_material
+    from faultgouge.analysis.files.formats import read_particles
     from faultgouge.door import load
 
     if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
         raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
-    return load(file, frame) if material is None else of_material(read_spheres(file, frame), material_of(material))
+    return load(file, frame) if material is None else of_material(read_particles(file, frame), material_of(material))
