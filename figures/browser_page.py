@@ -77,13 +77,9 @@ def loads_shown(disks: int) -> int:
 
 
 def write_view(
-    packings: Sequence[HasConfiguration],
-    path: Path,
-    title: str,
-    series: dict[str, Any] | None = None,
-    progress: Progress = iter,
-    axis: Axis | None = None,
-) -> None:
+    packings: Sequence[HasConfiguration], path: Path, title: str, series: dict[str, Any] | None = None,
+    progress: Progress = iter, axis: Axis | None = None,
+) -> None:  # fmt: skip
     """Write the page.
 
     Parameters
@@ -262,8 +258,7 @@ def sentences_of(verdict: Stability) -> list[str]:
     if found and verdict.dissipative:
         found = f"without dissipation {found}, D would grow as exp({u.growth_rate:.3g} t)"
     bound = f"{counted(at, 'contact')} at Coulomb's bound" if at else ""
-    says = [verdict.sentences[0], found, bound, *verdict.remarks]
-    return [f"{each[0].upper()}{each[1:]}." for each in says if each]
+    return [f"{each[0].upper()}{each[1:]}." for each in (verdict.sentences[0], found, bound, *verdict.remarks) if each]
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:

@@ -65,6 +65,3 @@ class RunFileReader(H5MDReader):
         super()._copy_to_data()
         # a file that was written before there was a link among the observables
         self.ts.data["position"] = self._particle_group["position/value"][self._frame]
-        low = self._file.get("faultgouge/trajectory/position_low", ())
-        if (behind := self._frame - self.n_frames) >= -len(low):
-            self.ts.data["position_low"] = low[behind]

@@ -61,21 +61,20 @@ def back(disks):
     return packing_of(disks, MindlinLaw(**law), upper_layer(disks, None), **given, drag_time=drag_time)
 
 
-@pytest.mark.parametrize(
-    "kind", ["as it is", "open sides", "compensated", "rescaled", "coulomb", "no contacts", "far image"]
-)
+@pytest.mark.parametrize("kind", range(7))
 def test_an_export_comes_back_to_the_bit(tmp_path, sheared, suffix, kind):
+    """As it is, with open sides, compensated, under laws of other histories, without contacts, in a far image."""
     packing, c = sheared, sheared.contacts
     inside = c.floor | (np.abs(packing.position[c.i, 0] - packing.position[c.j, 0]) < 5)
-    changed = {
-        "as it is": {},
-        "open sides": {"box_length": None, "contacts": Contacts(c.i[inside], c.j[inside], c.slip[inside])},
-        "compensated": {"position_low": packing.position * 1e-17, "contacts": c.slipped(c.slip, 1e-18 * c.i)},
-        "rescaled": {"law": replace(packing.law, rescaled=True)},
-        "coulomb": {"law": replace(packing.law, coulomb=True)},
-        "no contacts": {"contacts": Contacts([], [], [])},
-        "far image": {"position": packing.position + np.array([3 * packing.box_length, 0.0])},
-    }
+    changed = (
+        {},
+        {"box_length": None, "contacts": Contacts(c.i[inside], c.j[inside], c.slip[inside])},
+        {"position_low": packing.position * 1e-17, "contacts": c.slipped(c.slip, 1e-18 * c.i)},
+        {"law": replace(packing.law, rescaled=True)},
+        {"law": replace(packing.law, coulomb=True)},
+        {"contacts": Contacts([], [], [])},
+        {"position": packing.position + np.array([3 * packing.box_length, 0.0])},
+    )
     packing = replace(packing, **changed[kind])
     write_packing(tmp_path / f"packing{suffix}", packing)
     assert back(read_disks(tmp_path / f"packing{suffix}")) == packing
@@ -244,8 +243,6 @@ def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses
         np.testing.assert_array_equal(frame.positions[:, :2], place[k].astype(np.float32))
         assert exact.data["position"].dtype == np.float64
         np.testing.assert_array_equal(exact.data["position"][:, :2], place[k])
-        if packing.compensated and k:
-            np.testing.assert_array_equal(exact.data["position_low"], series["position_low"][k - 1])
 
 
 def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):

@@ -299,7 +299,8 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
         raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
     ends[ids == 0] = FLOOR
-    listed = Contacts(*np.where(ends[0] == FLOOR, ends[::-1], ends), slips.slip, slips.low)
+    i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
+    listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
         return listed
     slip = dict(zip(zip(listed.i.tolist(), listed.j.tolist(), strict=True), listed.slip.tolist(), strict=True))

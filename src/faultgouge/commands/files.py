@@ -117,9 +117,9 @@ def _spheres(
         material_of,
         of_material,
         read_contacts,
-        read_spheres,
         verdict_within_digits,
     )
+    from faultgouge.analysis.files.formats import read_particles
     from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
 
     if not is_root():
@@ -127,13 +127,13 @@ def _spheres(
     law, names = material_of(material), None if columns is None else columns.split(",")
     says: list[str] = []
     if contacts is None:
-        found = of_material(read_spheres(file, frame), law)
+        found = of_material(read_particles(file, frame), law)
         says = [*found.remarks]
     elif is_measured(contacts):
         with working("draws of the forces"):
             found, says = measured_forces(file, contacts, law, frame)
     else:
-        found = read_contacts(read_spheres(file, frame), contacts, law, names, frame)
+        found = read_contacts(read_particles(file, frame), contacts, law, names, frame)
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written")
     yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
