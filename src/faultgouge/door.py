@@ -329,7 +329,9 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
 
 
 class ViewedPage(type(Path())):  # type: ignore[misc]  # the class of paths of this system
-    """The path of a page, which a notebook shows."""
+    """The path of a page of some packings, which a notebook shows."""
+
+    packings: int = 0
 
     def _repr_html_(self) -> str:
         return f'<iframe srcdoc="{escape(self.read_text())}" width="100%" height="640" style="border: 0"></iframe>'
@@ -397,4 +399,6 @@ def view(
     if (needed := seconds(packings)) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {needed:.0f} s")
     write_view(packings, output, title, series, progress, axis)
-    return ViewedPage(output)
+    page = ViewedPage(output)
+    page.packings = len(packings)
+    return page

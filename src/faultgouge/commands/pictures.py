@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from typer import Argument, Option
@@ -28,8 +28,6 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from matplotlib.figure import Figure
 
     from faultgouge.figures.film import Film
@@ -195,11 +193,5 @@ def view(
     """
     from faultgouge.door import view as write_page
 
-    counts: list[int] = []
-
-    def shown(packings: Sequence[Any]) -> Iterable[Any]:
-        counts.append(len(packings))
-        return progress(packings, "loads")
-
-    write_page(file, output, loads, say, shown)
-    yield f"{counted(counts[-1], 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}"
+    page = write_page(file, output, loads, say, lambda packings: progress(packings, "loads"))
+    yield f"{counted(page.packings, 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}"
