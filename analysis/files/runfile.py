@@ -82,8 +82,9 @@ class RunFile(AbstractContextManager["RunFile"]):
         self._file = open_sealed(self.path, self._writable)
         if "snapshot" in self._file:
             self._file.close()
-            says = f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own"
-            raise PackingFileError(f"{says}: spectrum, draw, view and export take it.")
+            raise PackingFileError(
+                f"{self.path} holds a packing as LAMMPS left it, and no run of ours: spectrum, draw take it."
+            )
         with telling(self.path, "holds no run"):
             self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
 

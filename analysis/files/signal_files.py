@@ -66,8 +66,7 @@ def _record(path: Path, channel: str | None) -> Any:
 
         traces = list(read(str(path)))
     except ImportError:
-        needs = 'ObsPy, which reads records, is not installed: pip install "faultgouge[seismic]"'
-        raise SignalError(f"it is no table of two columns, and {needs}") from None
+        raise SignalError('it is no table of two columns; records need pip install "faultgouge[seismic]"') from None
     except Exception as error:  # whatever the reader of the format raises on a broken file
         reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
         raise SignalError(f"it is no table of two columns, and no record ({reason}): give another file") from None

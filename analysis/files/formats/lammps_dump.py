@@ -12,7 +12,7 @@ Law, load and inertia are not part of a dump. They are given by the caller or by
 ".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
 inertia_factor. A law from the caller takes precedence.
 
-Of a dump custom, columns are x or xu or xs, radius or diameter, and, if present, id, type, mass, theta. Several
+Of a dump custom, columns are x or xu, radius or diameter, and, if present, id, type, mass, theta. Several
 snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
 """
 
@@ -100,8 +100,7 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
 
 def _snapshot(path: Path, frame: int | None) -> DumpFrame:
     """A snapshot by its number; by default the last one, if all are of as many particles."""
-    counts = list[int]()
-    kept: deque[DumpFrame] = deque(maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
+    counts, kept = list[int](), deque[DumpFrame](maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
     for shown in dump_frames(path):
         kept.append(shown)
         counts.append(len(shown.rows))
@@ -112,16 +111,13 @@ def _snapshot(path: Path, frame: int | None) -> DumpFrame:
 
 
 def _disks(path: Path, shown: DumpFrame, columns: dict[str, Floats]) -> Disks:
-    """Columns in the box of a snapshot; scaled coordinates are taken to places."""
+    """Columns in the box of a snapshot."""
     low, high = shown.bounds[:, :2].T.copy()
     xy, xz, yz = shown.bounds[:, 2] if shown.bounds.shape[1] > 2 else np.zeros(3)
     # the bounds are those of a box around the tilted one
     low -= [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]
     high -= [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
     box = np.array([[high[0] - low[0], 0, 0], [xy, high[1] - low[1], 0], [xz, yz, high[2] - low[2]]])
-    if {"xs", "ys"} <= columns.keys() and "x" not in columns:
-        share = np.column_stack([columns.get(f"{axis}s", np.zeros(len(shown.rows))) for axis in "xyz"])
-        columns |= dict(zip("xyz", (low + share @ box).T, strict=True))
     sides = [each.startswith("p") for each in shown.boundary] if len(shown.boundary) == 3 else None
     return particles_of(f"{path} (step {shown.step})", columns, box, origin=low, periodic=sides)
 
@@ -186,8 +182,9 @@ def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None 
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]
     first, second = np.append(ids[i[touch]], ids[floor]), np.append(ids[j[touch]], 0 * ids[floor])
-    slip = [np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for name in ("slip", "slip_low") if name in pair]
-    return replace(found, given=given, slips=Slips(first, second, *slip, complete=True))
+    parts = {part: name for part, name in (("slip", "slip"), ("low", "slip_low")) if name in pair}
+    slip = {part: np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for part, name in parts.items()}
+    return replace(found, given=given, slips=Slips(first, second, **slip, complete=True))
 
 
 def _columns(path: Path, frame: DumpFrame, *needed: str, absent: Sequence[str] = ()) -> dict[str, Floats]:
@@ -195,8 +192,7 @@ def _columns(path: Path, frame: DumpFrame, *needed: str, absent: Sequence[str] =
     columns = dict(zip(frame.columns, frame.rows.T, strict=True))
     found = {name: np.zeros(len(frame.rows)) for name in needed if name in absent} | standard_names(columns)
     for name in (each for each in needed if each not in found):
-        has = ", ".join(frame.columns)
-        raise PackingFileError(f"{path} has no column {name} (its columns: {has}).")
+        raise PackingFileError(f"{path} has no column {name} (its columns: {', '.join(frame.columns)}).")
     return found
 
 

@@ -73,7 +73,6 @@ def stability(
     state is looked at. Without a file this is the old name of `faultgouge extremes`.
     """
     from faultgouge.door import is_deck
-    from faultgouge.pywrap.granular.run_deck import run_deck
 
     if file is None:
         say("faultgouge stability without a file is called faultgouge extremes now")
@@ -94,6 +93,8 @@ def stability(
     if not is_deck(file):
         judge(follow, stored_packing(refuse_scene(file), frame))
     else:
+        from faultgouge.pywrap.granular.run_deck import run_deck
+
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
             packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:
@@ -289,9 +290,10 @@ def vibrations(
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
-    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_spheres
+    from faultgouge.analysis.files.contact_tables import material_of, of_material
+    from faultgouge.analysis.files.formats import read_particles
     from faultgouge.door import load
 
     if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
         raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
-    return load(file, frame) if material is None else of_material(read_spheres(file, frame), material_of(material))
+    return load(file, frame) if material is None else of_material(read_particles(file, frame), material_of(material))
