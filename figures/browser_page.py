@@ -77,13 +77,9 @@ def loads_shown(disks: int) -> int:
 
 
 def write_view(
-    packings: Sequence[HasConfiguration],
-    path: Path,
-    title: str,
-    series: dict[str, Any] | None = None,
-    progress: Progress = iter,
-    axis: Axis | None = None,
-) -> None:
+    packings: Sequence[HasConfiguration], path: Path, title: str, series: dict[str, Any] | None = None,
+    progress: Progress = iter, axis: Axis | None = None,
+) -> None:  # fmt: skip
     """Write the page.
 
     Parameters
@@ -127,17 +123,16 @@ def write_view(
         "edge": EDGE,
         "ink": INK,
         "wall": FLOOR,
-        "extent": [np.min([each.low for each in images], axis=0).tolist(),
-                   np.max([each.high for each in images], axis=0).tolist()],
+        "extent": [np.min([e.low for e in images], axis=0).tolist(), np.max([e.high for e in images], axis=0).tolist()],
         "periodic": images[0].periodic,
         "walls": [dict(zip(("axis", "sign", "place"), plane, strict=True)) for plane in first.planes],
         "corners": images[0].corners.tolist(),
     }  # fmt: skip
-    own, walled = first.configuration, bool(first.planes) or not first.configuration.free.all()
+    walled = bool(first.planes) or not first.configuration.free.all()
     kinds = {
         "Yellow: upper layer.": first.top.any(),
         "Red: walls, and particles that are held.": walled and not first.top.any(),
-        "White: rattlers, which touch nothing.": len(own.rattlers),
+        "White: rattlers, which touch nothing.": len(first.rattlers),
         "Drag to turn.": first.dimension == 3,
         "Width of a bar: normal force.": True,
     }
@@ -262,8 +257,7 @@ def sentences_of(verdict: Stability) -> list[str]:
     if found and verdict.dissipative:
         found = f"without dissipation {found}, D would grow as exp({u.growth_rate:.3g} t)"
     bound = f"{counted(at, 'contact')} at Coulomb's bound" if at else ""
-    says = [verdict.sentences[0], found, bound, *verdict.remarks]
-    return [f"{each[0].upper()}{each[1:]}." for each in says if each]
+    return [f"{each[0].upper()}{each[1:]}." for each in (verdict.sentences[0], found, bound, *verdict.remarks) if each]
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:

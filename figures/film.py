@@ -156,17 +156,13 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
             frame = film.frame(number)
             now = np.asarray(Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE))
             if shown is not None:
-                still = np.abs(frame - colours[shown]).max(axis=2) <= COLOUR_DIFFERENCE
-                now = np.where(still, shown, now)
-            shown = now
-            picture = Image.fromarray(now, "P")
+                now = np.where(np.abs(frame - colours[shown]).max(axis=2) <= COLOUR_DIFFERENCE, shown, now)
+            picture, shown = Image.fromarray(now, "P"), now
             picture.putpalette(colours.ravel().tolist())
             yield picture
 
-    frames = iter(pictures())
-    next(frames).save(
-        path, "GIF", save_all=True, append_images=frames, duration=round(1000 / rate), loop=0, optimize=True
-    )
+    frames, duration = iter(pictures()), round(1000 / rate)
+    next(frames).save(path, "GIF", save_all=True, append_images=frames, duration=duration, loop=0, optimize=True)
 
 
 def _ffmpeg() -> Any:

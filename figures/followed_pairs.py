@@ -115,12 +115,8 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
         system = System.of(packings[k]) if unknown and k not in kept else None
         for known in unknown:
             later = known[min(n for n in known if n > k)]
-            if system is None:
-                _, image = _image(kept[k], later) or (None, None)
-            else:
-                image = later.at(system)
-                image = image if image.like(later) else None
-            if image is not None:
+            _, image = (None, later.at(system)) if system else _image(kept[k], later) or (None, None)
+            if image is not None and image.like(later):
                 known[k] = image
     found = []
     for known in pairs:
@@ -145,12 +141,9 @@ def _image(modes: Motions, pair: Plane) -> tuple[tuple[int, ...], Plane] | None:
 
 def _verdict_on(packing: HasConfiguration, modes: Motions, alone: bool) -> Stability:
     """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
-    slide = int(packing.configuration.contacts.one_sided.sum())
-    reasons = []
-    if slide and not alone:
-        contacts = counted(slide, "contact")
-        how = "this page does not follow, and `faultgouge spectrum --frame` does"
-        reasons.append(f"{contacts} at Coulomb's bound may slide on, which {how}")
+    slide = 0 if alone else int(packing.configuration.contacts.one_sided.sum())
+    how = "this page does not follow, and `faultgouge spectrum --frame` does"
+    reasons = [f"{counted(slide, 'contact')} at Coulomb's bound may slide on, which {how}"] if slide else []
     return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
 
 

@@ -81,16 +81,17 @@ class ModeShape(NamedTuple):
     def plain(self) -> str:
         """Eigenvalue, participation ratio and share of rotation, for a terminal."""
         sign = f" +- {abs(self.eigenvalue.imag):.6g} i" if self.is_complex else ""
-        head = f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, participation ratio "
-        return f"{head}{self.participation:.3f}, rotation {100 * self.rotation:.1f} % of the kinetic energy"
+        ratios = f"participation ratio {self.participation:.3f}, rotation {100 * self.rotation:.1f} %"
+        return f"mode {self.number}: lambda = {self.eigenvalue.real:.8g}{sign}, {ratios} of the kinetic energy"
 
     @property
     def words(self) -> str:
         """The same for a caption."""
         sign = rf" \pm {abs(self.eigenvalue.imag):.4g}\,i" if self.is_complex else ""
-        head = rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$"
-        more = f"rotation {100 * self.rotation:.0f} % of the kinetic energy"
-        return f"{head}\nparticipation ratio {self.participation:.2f}, {more}"
+        ratios = f"participation ratio {self.participation:.2f}, rotation {100 * self.rotation:.0f} %"
+        return (
+            rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$" + f"\n{ratios} of the kinetic energy"
+        )
 
 
 def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
@@ -124,10 +125,8 @@ def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
         where, later = (f"at F_x = {packing.fx:g} ", "a later --frame, or ") if packing.top.any() else ("", "")
-        raise BadInputError(
-            f"{where}all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet: "
-            f"take {later}a mode by its number"
-        )
+        says = f"{where}all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet"
+        raise BadInputError(f"{says}: take {later}a mode by its number")
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
     return [ModeShape.of(packing, modes, each) for each in (first, second)], words
 

@@ -143,13 +143,9 @@ def _packing_and_curve(packing: Packing, scale: float = 0.0) -> tuple[Figure, Ax
 
 
 def _beside_curve(
-    artist: PackingArtist,
-    panels: tuple[Axes, Axes],
-    course: Course,
-    which: NDArray[np.int_],
-    draw: Callable[[int], object],
-    key: str,
-) -> tuple[list[Artist], Callable[[int], None]]:
+    artist: PackingArtist, panels: tuple[Axes, Axes], course: Course, which: NDArray[np.int_],
+    draw: Callable[[int], object], key: str,
+) -> tuple[list[Artist], Callable[[int], None]]:  # fmt: skip
     """What moves, and the function that shows a frame, of a packing on the left and its place on a curve on the right.
 
     Parameters
@@ -217,13 +213,9 @@ def film_of_run(motion: RunMotion, frames: int, dots: int | None = DOTS) -> Film
 
 @styled
 def film_of_ramp(
-    packings: Sequence[Packing],
-    frames: int,
-    color: str = "mobilised",
-    dots: int | None = DOTS,
-    course: Course | None = None,
-    by_way: bool = False,
-) -> Film:
+    packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS,
+    course: Course | None = None, by_way: bool = False,
+) -> Film:  # fmt: skip
     """The equilibria of a ramp, and F_x over the displacement of the upper layer beside them.
 
     Parameters
@@ -246,8 +238,7 @@ def film_of_ramp(
     artist = PackingArtist(axes, packings[-1], color, 2 * first.radius.max(), points)
     disks, chains, view = artist.disks, artist.chains, View.of(first)
     widest = max(each.normal_force.max(initial=0.0) for each in packings) or 1.0
-    coloured = chains.get_array() is not None
-    if coloured:
+    if coloured := chains.get_array() is not None:
         bar = figure.colorbar(chains, ax=axes, shrink=0.6, aspect=28, pad=0.02, location="left")
         bar.set_label(COLOURS[color][0])
     axes.set(xlim=(view.low[0], view.high[0]))
@@ -293,13 +284,9 @@ def faces_by_way(packings: Sequence[Packing], shifts: Floats) -> list[NDArray[An
 
 @styled
 def film_of_modes(
-    packing: HasConfiguration,
-    modes: Sequence[ModeShape],
-    words: str,
-    frames: int,
-    periods: int,
+    packing: HasConfiguration, modes: Sequence[ModeShape], words: str, frames: int, periods: int,
     dots: int | None = DOTS,
-) -> Film:
+) -> Film:  # fmt: skip
     """The motion of one or two modes of disks, growth left out, a whole number of periods."""
     figure, axes, points = figure_for(packing, len(modes), below=0.95)
     reach = OF_MODE * packing.radius.max()

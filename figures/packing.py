@@ -88,13 +88,9 @@ class PackingArtist:
     """
 
     def __init__(
-        self,
-        axes: Axes,
-        packing: HasConfiguration,
-        color: str = "none",
-        margin: float = 0.0,
+        self, axes: Axes, packing: HasConfiguration, color: str = "none", margin: float = 0.0,
         points: float | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.packing, self.margin, self.view = packing, margin, View.of(packing, margin)
         low, high = self.view.low, self.view.high
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -248,10 +244,9 @@ def _add_keys(axes: Axes, packing: HasConfiguration, chains: LineCollection, col
     if largest:
         unit = 10.0 ** np.floor(np.log10(largest))
         values = [part * unit for part in (0.5, 1, 2, 5) if part * unit <= largest]
-        names = [f"$f_n = {values[0]:g}$", *(f"${value:g}$" for value in values[1:])]
         bars = [
-            Line2D([], [], color=INK, linewidth=widest * value / largest, label=name)
-            for name, value in zip(names, values, strict=True)
+            Line2D([], [], color=INK, linewidth=widest * value / largest, label=f"${'f_n = ' * (not k)}{value:g}$")
+            for k, value in enumerate(values)
         ]
         entries = [*([] if flat else patches), *bars]
         figure.legend(handles=entries, loc="outside lower center", ncols=len(entries), columnspacing=1.2)
@@ -264,8 +259,8 @@ def _draw_load(axes: Axes, packing: HasConfiguration, view: View) -> None:
     x, y = packing.position[packing.top].T
     x = x % packing.box_length if packing.box_length else x
     crest, length = y + packing.radius[packing.top], 1.2 * packing.radius.max()
-    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 5, "color": INK, "width": 0.006}
-    style |= {"clip_on": False, "in_layout": False}
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 5, "color": INK}
+    style |= {"width": 0.006, "clip_on": False, "in_layout": False}
     highest, middle = np.argmax(crest), 0.5 * (view.low[0] + view.high[0])
     if packing.fy:
         axes.quiver(x, crest + length, np.zeros_like(x), np.full_like(x, -length), **style)

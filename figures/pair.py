@@ -115,14 +115,10 @@ class PairCurve:
         return cls(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)
 
     @property
-    def real(self) -> Floats:
-        """Real parts, the smaller one first, shape (n, 2)."""
-        return np.sort(self.eigenvalues.real, axis=1)
-
-    @property
-    def imaginary(self) -> Floats:
-        """Imaginary parts, the negative one first, shape (n, 2); nan where the pair is unknown."""
-        return np.sort(np.where(np.isnan(self.eigenvalues), np.nan, self.eigenvalues.imag), axis=1)
+    def parts(self) -> tuple[Floats, Floats]:
+        """Real and imaginary parts, the smaller one first, shape (n, 2) each; nan where the pair is unknown."""
+        values = self.eigenvalues
+        return np.sort(values.real, axis=1), np.sort(np.where(np.isnan(values), np.nan, values.imag), axis=1)
 
     def smooth(self) -> "PairCurve":
         """The same pair with many points between its loads, see :func:`curve_through`."""
@@ -150,22 +146,19 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
     for number, curve in enumerate(curves):
         colour = to_hex(f"C{number}")
         fine = curve.smooth()
-        for panel, line, dots in ((real, fine.real, curve.real), (imaginary, fine.imaginary, curve.imaginary)):
+        for panel, line, dots in zip((real, imaginary), fine.parts, curve.parts, strict=True):
             panel.plot(fine.fx, line, color=colour)
             if len(curve.fx) <= DOTTED_LOADS:
                 panel.plot(curve.fx, dots, ".", color=colour, markersize=3)
+            if curve.fx_c is not None:
+                panel.axvline(curve.fx_c, color=colour, linewidth=0.6, linestyle=":")
         where = "" if curve.fx_c is None else f", $F_x^c = {curve.fx_c:.5g}$"
         real.plot([], [], color=colour, label=rf"$\mu = {curve.mu:g}${where}")
-        if curve.fx_c is not None:
-            for panel in (real, imaginary):
-                panel.axvline(curve.fx_c, color=colour, linewidth=0.6, linestyle=":")
-    real.margins(y=0.1)
     real.legend(loc="best")
     real.set_ylabel(r"$\mathrm{Re}\,\lambda$")
-    imaginary.set_ylabel(r"$\mathrm{Im}\,\lambda$")
-    imaginary.set_xlabel("$F_x$")
+    imaginary.set(xlabel="$F_x$", ylabel=r"$\mathrm{Im}\,\lambda$")
     for panel, name in ((real, "(a)"), (imaginary, "(b)")):
+        panel.margins(y=0.1)
         panel.set_xlim(min(curve.fx[0] for curve in curves), max(curve.fx[-1] for curve in curves))
         panel.set_title(name, loc="left", fontsize=8.5, pad=3)
-    imaginary.margins(y=0.1)
     return figure

@@ -79,17 +79,14 @@ def draw_growth(time: Floats, msd: Floats, rate: float | None, fitted: Growth | 
         As the paper's figure 4.
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
-    axes = figure.add_subplot()
-    label = "undamped run"
+    axes, label = figure.add_subplot(), "undamped run"
     if fitted is not None:
-        label = rf"$\mathrm{{d}}\ln D/\mathrm{{d}}t = {fitted.rate:.5g}$, measured"
-        if rate:
-            label += rf" (${100 * (fitted.rate / rate - 1):+.2g}\,\%$)"
+        off = rf" (${100 * (fitted.rate / rate - 1):+.2g}\,\%$)" if rate else ""
+        label = rf"$\mathrm{{d}}\ln D/\mathrm{{d}}t = {fitted.rate:.5g}$, measured{off}"
     draw_series(time, msd, axes, label=label)
     if rate:
-        ends, slope = _slope(time, msd, rate, fitted)
         predicted = rf"$2\,|\mathrm{{Im}}\,\omega| = {rate:.5g}$, from the spectrum"
-        axes.plot(ends, slope, color="C0", linestyle="--", label=predicted)
+        axes.plot(*_slope(time, msd, rate, fitted), color="C0", linestyle="--", label=predicted)
     begin_at_noise(axes, time, msd)
     few_decades(axes)
     title = "linearly stable: nothing grows" if rate == 0 else None
@@ -180,13 +177,11 @@ def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
     """
     figure = Figure(figsize=(5.2, 4.6), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))
-    time = series["time"]
-    risen = series["thickness"] - series["thickness"][0]
-    rows = [(series["force"], "force $F$", "C1"), (series["displacement"], "displacement", "C0")]
-    rows += [(risen, "dilation", "C0"), (series["at_bound"], "at the bound", "C0")]
+    rows = [(series["force"], "force $F$"), (series["displacement"], "displacement")]
+    rows += [(series["thickness"] - series["thickness"][0], "dilation"), (series["at_bound"], "at the bound")]
     draw_slips(panels, slips)
-    for axes, (values, label, color) in zip(panels, rows, strict=True):
-        axes.plot(time, values, color=color, linewidth=0.8)
+    for axes, (values, label) in zip(panels, rows, strict=True):
+        axes.plot(series["time"], values, color="C1" if axes is panels[0] else "C0", linewidth=0.8)
         axes.set_ylabel(label)
         axes.margins(x=0)
     panels[0].margins(y=0.12)
@@ -197,13 +192,11 @@ def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
 
 def draw_slips(panels: Sequence[Axes], slips: Sequence[Slip]) -> None:
     """A band for each slip in panels over time, and its number in the first panel, which shows the force."""
-    for axes in panels:
-        for slip in slips:
-            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
+    about: dict[str, Any] = {"xytext": (0, 3), "textcoords": "offset points", "ha": "center", "fontsize": 7}
     for number, slip in enumerate(slips, 1):
-        panels[0].annotate(
-            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
-        )
+        for axes in panels:
+            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
+        panels[0].annotate(str(number), (slip.begins, slip.force_before), **about)
 
 
 @styled
@@ -232,12 +225,11 @@ def draw_vibrations(found: Vibrations) -> Figure:
         axes.plot(found.frequency, found.quality, color=SHARE_COLOUR, linewidth=0.9)
         axes.set(ylabel="quality factor $Q$", yscale="log", xlabel=r"$\omega$")
     if found.modes is not None:
-        frequency, tiny = found.modes["frequency"], np.finfo(float).tiny
-        share.plot(frequency, found.modes["participation"], ".", color=INK, markersize=2, zorder=1)
+        frequency, dots = found.modes["frequency"], {"color": INK, "markersize": 2, "zorder": 1}
+        share.plot(frequency, found.modes["participation"], ".", **dots)
         share.set(ylabel="participation (dots), rotation (line)")
         for axes in more:
-            quality = frequency / np.maximum(found.modes["damping"], tiny)
-            axes.plot(frequency, quality, ".", color=INK, markersize=2, zorder=1)
+            axes.plot(frequency, frequency / np.maximum(found.modes["damping"], np.finfo(float).tiny), ".", **dots)
     return figure
 
 

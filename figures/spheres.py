@@ -136,12 +136,10 @@ def draw_spheres(
     order = np.argsort(-depth)
     order = order[~c.couple[order]]  # rolling friction has no bar of its own
     near = (depth.max() - depth) / (np.ptp(depth) or 1.0) if len(c) else depth
-    force = c.normal_force / (c.normal_force.max(initial=0.0) or 1.0)
-    if "array" in style:
-        style = style | {"array": np.asarray(style["array"])[order]}
-    about: dict[str, Any] = {"linewidths": (widest * force)[order], "capstyle": "round", "zorder": 3}
-    about["alpha"] = (FAR_OPACITY + (1 - FAR_OPACITY) * near)[order]
-    bars = LineCollection(list(np.stack([flat(start), flat(end)], axis=1)[order]), **about, **style)
+    about = style | {"linewidths": (widest * c.normal_force / (c.normal_force.max(initial=0.0) or 1.0))[order]}
+    about |= {"alpha": (FAR_OPACITY + (1 - FAR_OPACITY) * near)[order], "capstyle": "round", "zorder": 3}
+    about |= {"array": np.asarray(style["array"])[order]} if "array" in style else {}
+    bars = LineCollection(list(np.stack([flat(start), flat(end)], axis=1)[order]), **about)
     if widest:
         axes.add_collection(bars)
     return bars

@@ -37,9 +37,8 @@ def figure_of(axes: Axes) -> Figure:
 def require_axes(axes: object) -> None:
     """Refuse what is no matplotlib axes in a sentence, with what may have been meant."""
     if axes is not None and not isinstance(axes, Axes):
-        raise BadInputError(
-            f"draw takes matplotlib's Axes, and no {type(axes).__name__}: draw(packing).savefig(path) writes a file."
-        )
+        cure = "draw(packing).savefig(path) writes a file"
+        raise BadInputError(f"draw takes matplotlib's Axes, and no {type(axes).__name__}: {cure}.")
 
 
 @contextmanager

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -141,27 +141,29 @@ def onset_run(
                     reached(equilibrium)
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-        search = partial(find_onset, dissipation=dissipation, first=first, folder=folder)
+        options: dict[str, Any] = {
+            "dissipation": dissipation,
+            "first": first,
+            "folder": folder,
+            "ranks": search_ranks(),
+        }
         try:
-            found = search(lambda fx: with_dashpots(path(fx)), forces, ranks=search_ranks())
+            found = find_onset(lambda fx: with_dashpots(path(fx)), forces, **options)
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:  # as the user of a scene reads it
             undamped = getattr(error, "undamped", None)
-            undamped = undamped and with_path_error(undamped, path)
-            if flows or not isinstance(error, OnsetError):
-                what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
-                finding = (
-                    f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the "
-                    "packing flows before an onset"
-                )
-                raise (
-                    NoGrowthError(finding, undamped=undamped) if undamped else NoEquilibriumError(finding)
-                ) from error
-            failure = partial(NoGrowthError, undamped=undamped) if undamped else OnsetError
-            raise failure(error.finding, "raise ramp.until", error.finer) from error
-        equilibria = tuple(path.equilibria)
-        near = [] if near_onset is None else (found.fx_c + near_onset).tolist()
+            damped_alone = {"undamped": with_path_error(undamped, path)} if undamped else {}
+            if isinstance(error, OnsetError) and not flows:
+                failure: Any = NoGrowthError if undamped else OnsetError
+                raise failure(error.finding, "raise ramp.until", error.finer, **damped_alone) from error
+            what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
+            finding = (
+                f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
+                "flows before an onset"
+            )
+            raise (NoGrowthError if undamped else NoEquilibriumError)(finding, **damped_alone) from error
+        equilibria, near = tuple(path.equilibria), [] if near_onset is None else (found.fx_c + near_onset).tolist()
         between = {fx: path(fx) for fx in near if 0 <= fx <= equilibria[-1].fx}
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
@@ -172,12 +174,10 @@ def onset_run(
 def search_ranks() -> Ranks:
     """All ranks take part in one search; the ranks of a machine share its cores evenly. Collective."""
     world = MPI.COMM_WORLD
-    if world.size == 1:
-        return Ranks()
     own = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
     mine = MPI.Get_processor_name(), own
     beside = world.allgather(mine).count(mine)  # a launcher that binds ranks to cores leaves each its own
-    return Ranks(world.rank, world.size, world.allgather, max(1, len(mine[1]) // beside))
+    return Ranks(world.rank, world.size, world.allgather, max(1, len(own) // beside)) if world.size > 1 else Ranks()
 
 
 def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> float:
@@ -212,9 +212,9 @@ def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> floa
         end = ramp.first if first.fx_end is None else first.fx_end
         return min(first.fx_onset + ramp.step, 0.5 * (first.fx_onset + end))
     weakened = onset_for(mu * scene.friction.mu_ss).fx_c
-    if not weakened < first.fx_onset:
-        raise SceneError(
-            f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the "
-            f"weakened friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
-        )
-    return 0.5 * (weakened + first.fx_onset)
+    if weakened < first.fx_onset:
+        return 0.5 * (weakened + first.fx_onset)
+    raise SceneError(
+        f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the weakened "
+        f"friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
+    )

@@ -27,14 +27,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import svd
 
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
 from ..analysis.counted import counted
 from ..analysis.files.atomic_write import check_own, make_folder, read_plain, write_json
 from ..analysis.has_configuration import HasConfiguration
-from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
+from ..analysis.motion.eigenvalues import growing_undamped, in_balance, unit_rounding, zero_uncertainties
 from ..analysis.motion.linear import all_rates
 from ..analysis.motion.modes import Modes, participation_ratio
 from ..analysis.motion.motion import Motion
@@ -51,9 +51,6 @@ if TYPE_CHECKING:
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
 
-INVERSE_STEPS = 3
-"""Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
-
 STATE = ("pairs", "undamped", "damped", "lowest", "alone")
 """Numbers of a state, with all contacts at Coulomb's bound sticking, or all sliding: see `linear_state`."""
 
@@ -64,16 +61,9 @@ def with_spring(packing: HasConfiguration, spring: float) -> Configuration:
 
 
 def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATION) -> dict[str, Any]:
-    """Numbers of one state of a driven run.
+    """Numbers of one state of a driven run, with the stiffness of the spring, force / length on each disk of the layer.
 
-    Parameters
-    ----------
-    packing : Packing
-        The state.
-    spring : float
-        Stiffness of the spring, force / length on each disk of the layer.
-    lone : float
-        Disks that take part in a motion, below which the motion is that of one disk.
+    With less than `lone` disks that take part in a motion, the motion is that of one disk.
 
     Returns
     -------
@@ -121,42 +111,20 @@ def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE
     shared = shares(modes.right)
     rates = 2 * np.abs(np.sqrt(values[(complex_ | negative) & shared].astype(complex)).imag)
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
+    # the fastest growing first; its vector is what the pencil takes to zero but for rounding
     pencils = ((s, s * s * np.eye(len(stiffness)) + s * damping + stiffness) for s in all_rates(motion)[0])
-    damped = next((2 * float(s.real) for s, pencil in pencils if shares(null_vector(pencil)[:, None])[0]), None)
+    damped = next((2 * float(s.real) for s, pencil in pencils if shares(svd(pencil)[2][-1:].conj().T)[0]), None)
     lowest = values[shared & (np.abs(values) > zero)].real.min(initial=np.inf)
     pairs, alone = np.count_nonzero(complex_ & shared) // 2, np.count_nonzero((complex_ | negative) & ~shared)
     numbers = (int(pairs), float(rates.max(initial=0.0)), damped, float(lowest), int(alone))
     return dict(zip(STATE, numbers, strict=True))
 
 
-def null_vector(singular: Complexes) -> Complexes:
-    """The vector that a matrix takes to zero but for rounding, by inverse iteration.
-
-    A shift by some roundings keeps the pivots of a matrix that is exactly singular from being zero.
-    """
-    shift = SAFETY * unit_rounding(singular) * np.eye(len(singular))
-    factors = lu_factor(singular + shift, check_finite=False)
-    vector = np.random.Generator(np.random.PCG64(0)).standard_normal(len(singular)).astype(complex)
-    for _ in range(INVERSE_STEPS):
-        vector = lu_solve(factors, vector, check_finite=False)
-        vector /= np.linalg.norm(vector)
-    return vector
-
-
 def draw_cycle_spectrum(
     series: Mapping[str, Floats], slips: Sequence[Slip], states: Sequence[Mapping[str, Any]]
 ) -> Figure:
-    """Draw the force with its slips, and below the numbers of the states.
-
-    Parameters
-    ----------
-    series : mapping of str to ndarray, shape (S,)
-        Columns time and force of a driven run.
-    slips : sequence of Slip
-        Its slips, each a band from its beginning to its end.
-    states : sequence of mapping
-        Rows of `cycle_state` with the key time; a state within a slip is a pale dot.
-    """
+    """Draw the force over time of a driven run, its slips as bands, and below the numbers of the states, rows of
+    `cycle_state` with the key time; a state within a slip is a pale dot."""
     from matplotlib.figure import Figure
 
     from ..figures.series import draw_slips
@@ -186,11 +154,11 @@ def draw_cycle_spectrum(
     return figure
 
 
-STUCK, RATES = "all sticking", {"undamped_sticking": "undamped", "damped_sticking": "damped"}
+UNDAMPED = {"undamped_sticking": "undamped"}
 DRAWN = {
-    "complex pairs": {"pairs_sticking": STUCK, "pairs_sliding": "all sliding"},
-    "growth rate of $D$": RATES | {"damped_sliding": "damped, sliding"},
-    "lowest eigenvalue": {"lowest_sticking": STUCK, "lowest_sliding": "all sliding"},
+    "complex pairs": {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
+    "growth rate of $D$": UNDAMPED | {"damped_sticking": "damped", "damped_sliding": "damped, sliding"},
+    "lowest eigenvalue": {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
 }
 """Numbers of states that the panels below the force show."""
 

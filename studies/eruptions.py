@@ -65,13 +65,10 @@ END_OF_GROWTH = 0.1
 WORK_STEPS = 2000
 """Steps over which work is added up: some thirty periods of the fastest mode."""
 
-RISE_OF_D = 1e4
-"""Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
-by a few hundred times in `QUIET_TIME`."""
-
-WALK_FACTOR = 10.0
-"""Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
-drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
+RISE_OF_D, WALK_FACTOR = 1e4, 10.0
+"""D of a linearly stable packing has risen beyond so many times the D of the first time unit, since rounding alone
+drifts by a few hundred times in `QUIET_TIME`; and beyond so many times the D of a random walk, one rounding of a
+coordinate a time step: strong drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
 
 AMOUNTS, COUNTS = ("time", "msd", "slip", "kinetic_energy"), ("lost", "gained", "sliding")
 """What is sampled, and what of it are numbers of contacts."""
@@ -279,14 +276,11 @@ def _page(result: Result) -> Result:
     grown = [run["msd"] for run in free if run in unstable and run not in noisy]
     return {
         "runs": runs,
-        "fy": result["scene"]["load"]["fy"],
         "words": {ends: words for ends, (words, _) in ENDS.items()},
         "beside": [(run, beside[run["fx"]]) for run in free if run["fx"] in beside],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
         "small": len(noisy),
-        "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
-        "balance": max(run["balance"] for run in free),
         "criterion": (LATE_GROWTH_OF_D, DECADES_OF_D, QUIET_TIME),
     }
 

@@ -114,17 +114,8 @@ class ModesSection(Section):
 
 
 class PairCounts(NamedTuple):
-    """The complex pairs of one packing.
-
-    Attributes
-    ----------
-    omega : ndarray of complex, shape (P,)
-        Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
-    modes : int
-        Number of eigenvalues.
-    negative : tuple of float
-        The real negative eigenvalues, the most negative first, 1 / time^2.
-    """
+    """The complex pairs of one packing: of each the frequency with positive real and imaginary part, fastest growing
+    first, 1 / time; the number of eigenvalues; and the real negative ones, the most negative first, 1 / time^2."""
 
     omega: Complexes
     modes: int
@@ -175,17 +166,8 @@ def antisymmetric_norm(packing: Packing) -> float:
 
 
 def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
-    """The row of the packing at each load of [modes] that it bears.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a section [ramp].
-    rest : Equilibrium
-        The settled packing.
-    look : callable
-        Packing -> the numbers of one load.
-    """
+    """The row of a scene: `look`, packing -> the numbers of one load, at each load of [modes] that the packing bears,
+    from the settled packing on."""
     wanted = sorted((section_of(scene, ModesSection) or ModesSection()).fx_over_fy)
     step = require_section(scene.ramp, "ramp").step
     row: dict[str, Any] = {"ends": "until", "loads": []}
@@ -238,15 +220,8 @@ def medians_over_load(rows: Sequence[Row], names: Sequence[str] = QUANTITIES) ->
 
 
 def over_load(courses: Mapping[str, MediansOverLoad], names: Sequence[str] = QUANTITIES) -> Figure:
-    """Medians with their intervals over F_x/F_y, a panel for each quantity.
-
-    Parameters
-    ----------
-    courses : mapping
-        What is written beside a line -> its numbers.
-    names : sequence of str
-        The quantities.
-    """
+    """Medians with their intervals over F_x/F_y, a panel for each quantity; what is written beside a line -> its
+    numbers."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
@@ -261,10 +236,8 @@ def over_load(courses: Mapping[str, MediansOverLoad], names: Sequence[str] = QUA
         axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
         axes.set_xticks(ticks, [f"{load:g}" for load in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
-        if not any(np.isfinite(line.get_ydata()).any() for line in axes.lines):
-            axes.text(0.5, 0.5, "no motion grows", transform=axes.transAxes, ha="center", color=INK)
-            axes.set_xlim(0.5 * seen[0], 2 * seen[-1])
-        elif name in ("growth_rate", "least_q"):
+        axes.set_xlim(0.8 * seen[0], 1.25 * seen[-1])  # also where no motion grows, and nothing is drawn
+        if name in ("growth_rate", "least_q"):
             axes.set_yscale("log")
         if name == "least_q":
             axes.axhspan(*ROCK, color="0.9", zorder=0)

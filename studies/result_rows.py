@@ -32,23 +32,22 @@ def read_keyed_rows(path: Path, keys: Sequence[str], what: str) -> list[Row]:
     The file stays as it is. A last line without its end, which a kill has cut or another process is writing, is no row.
     Raises SceneError if a line is no such row.
     """
-    if not path.exists():
-        return []
     try:
-        data = read_plain(path)
+        data = read_plain(path) if path.exists() else b""
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): take it out, or give another folder") from None
     rows: list[Row] = []
     for number, line in enumerate(data[: data.rfind(b"\n") + 1].splitlines(), 1):
         try:
-            rows.append(json.loads(line))
-            identity, *_ = [rows[-1][key] for key in keys]
+            row = json.loads(line)
+            identity, *_ = [row[key] for key in keys]
             hash(identity)
-            number_of_format = rows[-1].pop(FORMAT_KEY, None)
+            number_of_format = row.pop(FORMAT_KEY, None)
         except (ValueError, KeyError, TypeError, RecursionError):
             says = f"{path}: line {number} is no result of {what}: take it out, or give another folder"
             raise SceneError(says) from None
         check_format(number_of_format, f"{path}, line {number},")
+        rows.append(row)
     return rows
 
 

@@ -164,15 +164,14 @@ class RegisteredStudy:
         assert self.compute is not None
         self.check(scene)
         pool: Any
-        world = MPI.COMM_WORLD
-        with MPICommExecutor(world) if world.size > 1 else nullcontext() as pool:
+        with MPICommExecutor(world) if (world := MPI.COMM_WORLD).size > 1 else nullcontext() as pool:
             if world.rank != 0:
                 return {}
-            map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output, f"{self.name}.json", f"{self.name}.md")
             rows = Rows(output / f"{self.name}.jsonl", source_of(scene, self.beside))
-            alone = partial(settle, scene, communicator=MPI.COMM_SELF)
-            found = self.compute(scene, Work(rows, alone, map_rows, say, progress))
+            map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
+            start = partial(settle, scene, communicator=MPI.COMM_SELF)
+            found = self.compute(scene, Work(rows, start, map_rows, say, progress))
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
         write_json(output / f"{self.name}.json", result)
@@ -189,10 +188,11 @@ def study(*, row: bool = False, **given: Any) -> Callable[[Callable[[Scene, Work
 
     def register(compute: Callable[[Scene, Work], Result]) -> RegisteredStudy:
         def of_scene(scene: Scene, start: Start) -> Row:
-            given.get("check", id)(scene)
+            made.check(scene)
             return compute(scene, Work(Rows(), start))
 
-        return RegisteredStudy(name=compute.__name__, compute=compute, row=of_scene if row else None, **given)
+        made = RegisteredStudy(name=compute.__name__, compute=compute, row=of_scene if row else None, **given)
+        return made
 
     return register
 

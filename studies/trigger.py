@@ -48,17 +48,13 @@ if TYPE_CHECKING:
 DEFAULT_FREQUENCIES = 24
 """Frequencies of a map whose scene names none."""
 
-FIRST_BRACKET = 0.05
-"""Relative distance from the prediction at which the bisection begins."""
+FIRST_BRACKET, BRACKET_FACTOR = 0.05, 1.5
+"""Relative distance from the prediction at which the bisection begins, and the factor by which a bracket that does not
+hold is widened on the wrong side."""
 
-BRACKET_FACTOR = 1.5
-"""Factor by which a bracket that does not hold is widened on the wrong side."""
-
-BISECTION_RUNS = 24
-"""Runs of a bisection at the most: brackets over six decades."""
-
-BISECTION_WIDTH = 1e-2
-"""Relative width at which the bisection ends: its middle is then within half a percent."""
+BISECTION_RUNS, BISECTION_WIDTH = 24, 1e-2
+"""Runs of a bisection at the most, for brackets over six decades; and the relative width at which it ends: its middle
+is then within half a percent."""
 
 Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 
@@ -110,19 +106,11 @@ def settings(scene: Scene) -> Trigger:
 
 
 def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Row]:
-    """a_c at one distance from K, C and M.
+    """a_c at one distance from K, C and M; SceneError if the packing is unstable there.
 
-    Raises
-    ------
-    SceneError
-        If the packing is unstable there.
-
-    Returns
-    -------
-    list of dict
-        fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or an
-        acceleration of the floor; stationary : a_c without the transient, v_0/abs(H(omega)); reached : when the layer
-        is fastest, time.
+    Rows of fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or
+    an acceleration of the floor; stationary : a_c without the transient, v_0/abs(H(omega)); reached : when the layer is
+    fastest, time.
     """
     if growth_rate(packing) > 0:
         where = f"at F_x = {packing.fx:.10g}, below the onset," if packing.fx > 0 else "before any shear is added"
@@ -141,11 +129,8 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
 def bisect_amplitude(wave: Wave) -> Row:
     """a_c in LAMMPS, on this process alone.
 
-    Returns
-    -------
-    dict
-        fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the weakest that
-        did; runs : of the bisection; reached : when the weakest one triggered, time.
+    The row has fx, distance, omega : of the wave; below, above : the strongest wave that did not trigger, and the
+    weakest that did; runs : of the bisection; reached : when the weakest one triggered, time.
     """
     scene, packing, expected = wave
     omega, v0, given, dt, runs = expected["omega"], threshold(scene), settings(scene), time_step(packing), 0
@@ -156,7 +141,7 @@ def bisect_amplitude(wave: Wave) -> Row:
         with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, amplitude, omega, target) as dynamics:
             dynamics.halt_above(v0)
             dynamics.advance(steps)
-            return dynamics.steps * dt if dynamics.steps < steps else None
+            return engine.steps * dt if engine.steps < steps else None
 
     below, above = expected["predicted"] * (1 - FIRST_BRACKET), expected["predicted"] * (1 + FIRST_BRACKET)
     reached, holds = None, False  # whether the wave `below` is known not to trigger
@@ -255,11 +240,10 @@ def trigger(scene: Scene, work: Work) -> Result:
         omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
     waves, table = list[Wave](), list[Row]()
     for k, (distance, packing) in enumerate(packings.items()):
-        known = rows.find(kind="predicted", distance=distance)
-        if known is None:
-            new = predictions(scene, packing, distance, omegas)
-            known = rows.append(kind="predicted", distance=distance, found=new)
-        row = known["found"]
+        row = (
+            rows.find(kind="predicted", distance=distance)
+            or rows.append(kind="predicted", distance=distance, found=predictions(scene, packing, distance, omegas))
+        )["found"]
         table += row
         least = min(row, key=lambda each: each["predicted"])
         work.say(

@@ -91,19 +91,9 @@ Series = dict[str, Floats]
 
 
 class Forecast(NamedTuple):
-    """The linear motion after friction has weakened.
-
-    Attributes
-    ----------
-    jump : float
-        Largest D within the window of the jump, length^2.
-    growth : float
-        Decades from the jump to the largest D of the whole run; without bound, where a pair grows.
-    room : float
-        Decades from the jump to the D at which the motion ceases to be linear.
-    rate : float
-        Growth rate of D of the fastest motion, 1 / time; 0 if none grows.
-    """
+    """The linear motion after friction has weakened: the largest D within the window of the jump, length^2; decades
+    from the jump to the largest D of the whole run, without bound where a pair grows; decades from the jump to the D at
+    which the motion ceases to be linear; growth rate of D of the fastest motion, 1 / time, 0 if none grows."""
 
     jump: float
     growth: float
@@ -112,23 +102,12 @@ class Forecast(NamedTuple):
 
 
 class Triggering(NamedTuple):
-    """Undamped runs from one equilibrium.
+    """Undamped runs from one equilibrium, which is linearly stable.
 
-    Attributes
-    ----------
-    scene : Scene
-        With [perturb] and [friction].
-    start : Equilibrium
-        Linearly stable.
-    weakening : Weakening
-        mu(v), with v_0 the largest velocity of the unperturbed run if the scene gives none.
-    runs : dict
-        By name: unperturbed; perturbed; erupting, with mu(v) as well; control, the same at a force where the packing
-        is stable with the weakened friction, too, if one is known.
-    foreseen : Forecast
-        What linear theory says of the run with mu(v) after friction has weakened.
-    outcome : dict
-        What the run with mu(v) shows, see `judge`.
+    `weakening` is mu(v), with v_0 the largest velocity of the unperturbed run if the scene gives none. `runs` by name:
+    unperturbed; perturbed; erupting, with mu(v) as well; control, the same at a force where the packing is stable with
+    the weakened friction, too, if one is known. `foreseen` is what linear theory says of the run with mu(v) after
+    friction has weakened, and `outcome` what this run shows, see `judge`.
     """
 
     scene: Scene
@@ -144,17 +123,8 @@ class Triggering(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """Response of the pair that is about to coalesce, over the distance from the onset.
-
-    Attributes
-    ----------
-    distance : ndarray, shape (n,)
-        1 - F_x/F_x^c.
-    pairs : tuple of NormalForm
-        The pair at these distances.
-    fit : PowerLaw
-        Of the undamped amplitude over the distance.
-    """
+    """Response of the pair that is about to coalesce: distances 1 - F_x/F_x^c from the onset, shape (n,), the pair at
+    these distances, and the fit of the undamped amplitude over the distance."""
 
     distance: Floats
     pairs: tuple[NormalForm, ...]
@@ -175,21 +145,12 @@ def follow(
     communicator: MPI.Comm | None = None,
     store: Callable[[str, Series], None] = lambda name, series: None,
 ) -> Triggering:
-    """The runs from an equilibrium, and what the one with mu(v) shows.
+    """The runs from an equilibrium, the control from the one below, and what the run with mu(v) shows.
 
-    Parameters
-    ----------
-    scene : Scene
-        With [perturb], the perturbation and the length of the runs, and [friction], mu(v).
-    start : Equilibrium
-        Where they start.
-    below : Equilibrium or None
-        Where the control starts.
-    early : tuple of int
-        Samples at times that grow geometrically, of the perturbed runs and of the one whose friction falls: the layer
-        passes the velocities over which the friction falls early in a run, within a small share of its length.
-    store : callable
-        Called with the name and the samples of each run as it ends.
+    The scene has [perturb], the perturbation and the length of the runs, and [friction], mu(v). `early` are samples at
+    times that grow geometrically, of the perturbed runs and of the one whose friction falls: the layer passes the
+    velocities over which the friction falls early in a run, within a small share of its length. `store` is called with
+    the name and the samples of each run as it ends.
     """
     settings, friction = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction")
     runs: dict[str, Series] = {}
@@ -223,14 +184,7 @@ def time_of_crossing(run: Series, v0: float) -> float | None:
 def judge(run: Series, v0: float, foreseen: Forecast) -> Row:
     """Whether a run with mu(v) shows an instability, or the jump of the equilibrium alone.
 
-    Parameters
-    ----------
-    run : dict of ndarray
-        The run.
-    v0 : float
-        Velocity of the layer above which friction weakens, length / time.
-    foreseen : Forecast
-        Of linear theory with the weakened friction.
+    Friction weakens where the layer is faster than v_0, length / time; the forecast is that of the weakened friction.
 
     Returns
     -------

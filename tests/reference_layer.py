@@ -61,3 +61,14 @@ SMALL = {
     "ramp": {"step": 5e-3, "until": 0.025},
 }
 """A scene whose onset takes a second."""
+
+
+def store(path, *packings, about=None, times=(), **scalars):
+    """A run.h5 of packings, with attributes, and with times or other numbers of each; returns its path."""
+    from faultgouge.analysis import RunFile
+
+    with RunFile.create(path, packings[0], about or {}) as file:
+        for k, packing in enumerate(packings):
+            file.append(packing, **({"time": times[k]} if times else {}), **scalars)
+        file.complete = True
+    return path

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import SMALL, toml
+from reference_layer import SMALL, store, toml
 
 import faultgouge
 from faultgouge import analysis, pywrap
-from faultgouge.analysis import BadInputError, Contacts, FaultgougeError, MindlinLaw, Packing, PackingFileError, RunFile
+from faultgouge.analysis import BadInputError, Contacts, FaultgougeError, MindlinLaw, Packing, PackingFileError
 from faultgouge.pywrap import Equilibrium, settle_for_drive
 
 
@@ -43,10 +43,7 @@ def cluster_file(tmp_path):
     packing = Packing(
         position=[[0.0, 0.49]], radius=[0.5], contacts=Contacts([0], [-1], [0.0]), law=MindlinLaw(2e3, 6e2, 0.5)
     )
-    with RunFile.create(tmp_path / "run.h5", packing) as file:
-        file.append(packing)
-        file.complete = True
-    return tmp_path / "run.h5"
+    return store(tmp_path / "run.h5", packing)
 
 
 def test_a_packing_may_be_the_path_of_its_file(cluster_file, tmp_path):
@@ -179,12 +176,7 @@ def stored_ramp(tmp_path_factory):
     for each in ("three_disks.toml", "examples/disks.csv", "examples/fcc.in"):
         text = (scenes / each).read_text()
         (folder / Path(each).name).write_text(text.replace("step = 0.025", "step = 0.15"))  # six times as fast
-    path = faultgouge.ramp(folder / "three_disks.toml")
-    first = next(path)
-    with RunFile.create(folder / "run.h5", first.packing) as file:
-        for each in (first, *path):
-            file.append(each.packing)
-        file.complete = True
+    store(folder / "run.h5", *(each.packing for each in faultgouge.ramp(folder / "three_disks.toml")))
     return folder
 
 

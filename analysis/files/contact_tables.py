@@ -39,12 +39,10 @@ import numpy as np
 from ..arrays import Floats, derive_frozen
 from ..configuration import Configuration
 from ..contacts import WALL
-from ..counted import counted
 from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
 from .atomic_write import telling
-from .formats import read_particles
 from .formats.disks import Disks, choose_frame
 from .formats.tables import columns_of, contact_columns, lines_of, number_of, strip_comments
 
@@ -73,23 +71,21 @@ def material_of(text: str) -> Material:
     """A material of key=value,...; a BadInputError names the word that is wrong."""
     given: dict[str, float] = {}
     for word in text.split(","):
-        key, equals, value = word.partition("=")
-        if key.strip() not in Material._fields or not equals:
+        key, _, value = word.partition("=")
+        if key.strip() not in Material._fields or not value:
             raise BadInputError(f"--material {word.strip()!r}: give {', '.join(Material._fields)}, as in young=7e10")
         given[key.strip()] = number_of(value, f"--material {key.strip()}")
     return Material(**given).checked()
 
 
-def read_spheres(path: Path, frame: int = -1) -> Disks:
-    """Read the spheres of a table; a PackingFileError if a column is missing, or has what no sphere can have."""
-    return read_particles(path, frame)
-
-
 def of_material(spheres: Disks, material: Material, **more: Any) -> Configuration:
     """Spheres with Hertz's contacts, or springs; in a sentence of their table where they form no packing."""
-    mass = spheres.mass if material.density is None else None
-    periodic = [False] * 3 if spheres.periodic is None else spheres.periodic
-    options = {"box": spheres.box, "origin": spheres.origin, "mass": mass, "periodic": periodic} | more
+    options: dict[str, Any] = {
+        "box": spheres.box,
+        "origin": spheres.origin,
+        "periodic": spheres.periodic or [False] * 3,
+    }
+    options |= {"mass": spheres.mass if material.density is None else None} | more
     with telling(spheres.source, "describes no possible packing", ValueError):
         return spheres_of_material(spheres.position, spheres.radius, material, **options)
 
@@ -124,11 +120,13 @@ def read_contacts(
     bears = np.any(given, axis=0) if given else np.ones(len(table["id1"]), bool)
     table = {name: column[bears] for name, column in table.items()}
     ids = np.array([table["id1"], table["id2"]])
-    i, j = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
-    wall = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
-    j[wall] = WALL
-    for strange in [*ids[0][spheres.id[i] != ids[0]], *ids[1][~wall & (spheres.id[j] != ids[1])]]:
+    wall = (ids < 0) | ((ids == 0) & (0 not in spheres.id))
+    wall[0] = False
+    ends = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
+    for strange in ids[~wall & (spheres.id[ends] != ids)]:
         raise PackingFileError(f"{path}: a contact names sphere {strange:g}, which is not in {spheres.source}.")
+    ends[wall] = WALL
+    (i, j), wall = ends, wall[1]
     for itself in ids[0][i == j]:
         raise PackingFileError(f"{path}: sphere {itself:g} touches itself.")
 
@@ -161,26 +159,24 @@ def read_contacts(
     i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
     size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
     for k in np.flatnonzero(size > (1 + AT_REST) * bound):
-        says = f"|f_t| of {spheres.id[i[k]]} is {size[k] / max(fn[k], 1e-300):.4g} f_n"
-        beyond = f"beyond the coefficient of friction {material.friction:g}: give --material friction=."
-        raise PackingFileError(f"{path}: {says}, {beyond}")
+        says = (
+            f"|f_t| of {spheres.id[i[k]]} is {size[k] / max(fn[k], 1e-300):.4g} f_n, beyond the coefficient of friction"
+        )
+        raise PackingFileError(f"{path}: {says} {material.friction:g}: give --material friction=.")
     # what the digits do not tell from the bound is at the bound
     ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
 
-    found, lacks, remarks = None, np.inf, list[str]()
-    for sign in (1.0, -1.0):
-        more = {"contacts": (i, j, branch), "normal_force": fn, "tangential_force": sign * ft, "periodic": periodic}
-        other = of_material(spheres, material, **more)
-        flipped = _out_of_balance(other)
-        if found is None or flipped < BETTER_SIGN * lacks:
-            found, lacks = other, flipped
-            remarks += ["tangential forces are those on the second particle: with the other sign they do not balance"]
-    assert found is not None
+    more = {"contacts": (i, j, branch), "normal_force": fn, "periodic": periodic}
+    found, other = (of_material(spheres, material, tangential_force=sign * ft, **more) for sign in (1.0, -1.0))
+    lacks, flipped, remarks = _out_of_balance(found), _out_of_balance(other), list[str]()
+    if flipped < BETTER_SIGN * lacks:
+        found, lacks = other, flipped
+        remarks = ["tangential forces are those on the second particle: with the other sign they do not balance"]
     if lacks > AT_REST:
-        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
-        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
-    balance = f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left"
-    return derive_frozen(found, remarks=(*remarks[1:], balance))
+        cure = "it does not rest, or a contact or a wall is missing"
+        raise PackingFileError(f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force: {cure}.")
+    remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
+    return derive_frozen(found, remarks=tuple(remarks))
 
 
 def _forces(path: Path, table: dict[str, Floats], n: Floats) -> tuple[Floats, Floats]:
@@ -212,7 +208,7 @@ def _out_of_balance(c: Configuration) -> float:
     return float(np.abs(force[touch]).max(initial=0.0) / (c.normal_force.mean() if len(c.contacts) else 1.0))
 
 
-def verdict_within_digits(found: Configuration, draws: int = ROUNDED_TABLES) -> tuple[Stability, str]:
+def verdict_within_digits(found: Configuration) -> tuple[Stability, str]:
     """The verdict of a packing of a table, and what its digits tell of it.
 
     Returns
@@ -222,10 +218,8 @@ def verdict_within_digits(found: Configuration, draws: int = ROUNDED_TABLES) -> 
     says : str
         Whether all draws of forces and stiffnesses within the rounding of six digits have the same verdict.
     """
-    verdict = stability(found)
-    rng, seen, rates = np.random.default_rng(0), [verdict.stable], [verdict.growth_rate]
-    c = found.contacts
-    for _ in range(draws):
+    verdicts, c, rng = [stability(found)], found.contacts, np.random.default_rng(0)
+    for _ in range(ROUNDED_TABLES):
         error = 1 + HALF_A_DIGIT * rng.uniform(-1, 1, (2, len(c)))
         turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * rng.uniform(-1, 1, (len(c), 3))
         turned -= np.einsum("ca,ca->c", turned, c.normal)[:, None] * c.normal
@@ -237,13 +231,12 @@ def verdict_within_digits(found: Configuration, draws: int = ROUNDED_TABLES) -> 
             c, normal_force=c.normal_force * error[0], friction=most, tangential_force=turned * held[:, None],
             normal_stiffness=c.normal_stiffness * error[1], tangential_stiffness=c.tangential_stiffness * error[1],
         )  # fmt: skip
-        other = stability(derive_frozen(found, contacts=drawn, load=found.load))
-        seen.append(other.stable)
-        rates.append(other.growth_rate)
+        verdicts.append(stability(derive_frozen(found, contacts=drawn, load=found.load)))
+    seen, words = [each.stable for each in verdicts], {True: "stable", False: "unstable", None: "not known"}
     if len(set(seen)) > 1:
-        words = {True: "stable", False: "unstable", None: "not known"}
         says = ", ".join(f"{words[each]} in {seen.count(each)}" for each in dict.fromkeys(seen))
-        return verdict, f"six digits do not tell: of {len(seen)} tables that round to this one the verdict is {says}"
-    spread = [each for each in rates if each is not None and np.isfinite(each)]
+        says = f"six digits do not tell: of {len(seen)} tables that round to this one the verdict is {says}"
+        return verdicts[0], says
+    spread = [each for v in verdicts if (each := v.growth_rate) is not None and np.isfinite(each)]
     more = f", with growth rates from {min(spread):.6g} to {max(spread):.6g}" if spread else ""
-    return verdict, f"six digits tell: {counted(len(seen), 'table')} that round to this one have this verdict{more}"
+    return verdicts[0], f"six digits tell: {len(seen)} tables that round to this one have this verdict{more}"

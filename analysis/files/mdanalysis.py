@@ -63,16 +63,8 @@ class RunFileReader(H5MDReader):
 
     def _copy_to_data(self) -> None:
         super()._copy_to_data()
-        data, position = self.ts.data, self._particle_group["position"]
         # a file that was written before there was a link among the observables
-        data["position"] = position["value"][self._frame]
-        low = self._file.get("faultgouge/trajectory/position_low")
-        behind = self._frame - position["value"].shape[0]
-        if low is not None and behind >= -len(low):
-            data["position_low"] = low[behind]
-
-    @staticmethod
-    def parse_n_atoms(filename: Any, **_: Any) -> int:
-        """Number of disks."""
-        with RunFile(filename) as file:
-            return len(file.packing(0))
+        self.ts.data["position"] = self._particle_group["position/value"][self._frame]
+        low = self._file.get("faultgouge/trajectory/position_low", ())
+        if (behind := self._frame - self.n_frames) >= -len(low):
+            self.ts.data["position_low"] = low[behind]

@@ -63,7 +63,7 @@ def _rows(path: Path, *widths: int) -> Floats:
 
 
 def measured_forces(
-    particles: Path, contacts: Path, material: Material, frame: int = -1, error: float | None = None
+    particles: Path, contacts: Path, material: Material, frame: int = -1
 ) -> tuple[Configuration, list[str]]:
     """A packing with measured contact forces, and what can be said of it.
 
@@ -71,8 +71,6 @@ def measured_forces(
     ----------
     frame : int
         Which of the steps of the table of contacts, in their order.
-    error : float, optional
-        Error of f_n, relative; by default what the two sides of the contacts say, if they differ.
 
     Returns
     -------
@@ -89,11 +87,10 @@ def measured_forces(
     disks, rows = _rows(particles, 5, 6), _rows(contacts, 5)
     steps = np.unique(rows[:, 0])
     step = steps[choose_frame(contacts, [0] * len(steps), frame)]
-    rows = rows[rows[:, 0] == step]
-    if disks.shape[1] == 6:
-        disks = disks[disks[:, 0] == step][:, 1:]
+    disks = disks[disks[:, 0] == step][:, 1:] if disks.shape[1] == 6 else disks
+    rows, ids = rows[rows[:, 0] == step], disks[:, 0]
     walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
-    rows, ids = rows[~walls], disks[:, 0]
+    rows = rows[~walls]
     for strange in np.setdiff1d(rows[:, 1:3], ids):
         raise PackingFileError(f"{contacts}: a contact names disk {strange:g}, which is not in {particles}.")
     # mean of the rows of each pair; the tangent turns with the normal, so that f_t is the same from both sides
@@ -103,8 +100,7 @@ def measured_forces(
     ft, fn = (np.bincount(place, rows[:, k], len(pairs)) / count for k in (3, 4))
     differ = np.abs(rows[:, 4] - fn[place]) / np.maximum(fn[place], np.finfo(float).tiny)
     twice = differ[(count[place] > 1) & (differ > 0)]
-    if error is None and len(twice):
-        error = 2 * float(np.median(twice))
+    error = 2 * float(np.median(twice)) if len(twice) else None
     (i, j), fn, ft = pairs[fn > 0].T, fn[fn > 0], ft[fn > 0]
     centre, radius = disks[:, 1:3], disks[:, 3]
     branch = np.pad(centre[i] - centre[j], ((0, 0), (0, 1)))
@@ -128,18 +124,15 @@ def measured_forces(
     found, other = packing(fn, ft), packing(fn, -ft)
     if inside.any() and imbalance(other).mean() < imbalance(found).mean():
         found, ft = other, -ft
-    if error is None:
-        chance = "the table has one f_n for a contact, not one from either side: its error, and a chance, are not known"
-    else:
+    chance = "the table has one f_n for a contact, not one from either side: its error, and a chance, are not known"
+    if error is not None:
         rng, seen = np.random.default_rng(0), []
         for _ in range(DRAWN_FORCES):
             drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
             seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
         unknown = f", and {seen.count(None)} not known" if None in seen else ""
-        chance = (
-            f"unstable in {seen.count(False)} of {DRAWN_FORCES} draws of the forces within an error of f_n of "
-            f"{error:.2g}{unknown}, if a load on each disk balanced the forces drawn"
-        )
+        chance = f"unstable in {seen.count(False)} of {DRAWN_FORCES} draws of the forces within an error of f_n of "
+        chance += f"{error:.2g}{unknown}, if a load on each disk balanced the forces drawn"
     left_out = f"; {counted(int(walls.sum()), 'row')} of walls left out, whose place no file has" if walls.any() else ""
     # motions of the disks in contact that stretch no spring, without translations and rotation as a whole
     c, none = found.contacts, np.zeros_like(found.contacts.normal)
@@ -151,10 +144,10 @@ def measured_forces(
     values = eigvalsh(matrix[moves][:, moves].toarray())
     floppy = 3 * np.count_nonzero(touches) - 3 - int(np.sum(values > FREE_OF_SPRINGS * values[-1]))
     lacks = np.median(imbalance(found)) if inside.any() else 0.0
+    disks_of = counted(len(np.unique(pairs)), "disk")
     says = [
-        f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {int(c.at_bound.sum())} at "
-        f"Coulomb's bound; forces on a disk are out of balance by {lacks:.2g} of its "
-        f"mean contact force (median){left_out}",
+        f"{counted(len(fn), 'contact')} of {disks_of}, {int(c.at_bound.sum())} at Coulomb's bound; forces on a disk "
+        f"are out of balance by {lacks:.2g} of its mean contact force (median){left_out}",
         f"{floppy} motions without stiffness beside those of a free body, if contacts at the bound slide",
         chance,
         NO_RATE,

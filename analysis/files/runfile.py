@@ -31,9 +31,7 @@ Datasets depend on the scene alone; scene, versions, seed and ranks are attribut
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import MISSING, fields
-from functools import cached_property
+from contextlib import AbstractContextManager, contextmanager
 from os import PathLike
 from pathlib import Path
 from time import monotonic
@@ -63,13 +61,13 @@ COMPACT: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
-LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
-"""Default parameters of the law, which a file need not have."""
+NEEDED_BY_LAW = "kn", "kt", "mu"
+"""Parameters of the law that a file must have; the others have defaults."""
 
 POSITION, EDGES = "particles/disks/position", "particles/disks/box/edges"
 
 
-class RunFile:
+class RunFile(AbstractContextManager["RunFile"]):
     """A run.h5, checked whole, open for reading or for appending; a context manager.
 
     A file that is open for appending is kept in memory. When it is saved, all of it replaces the stored file; saving
@@ -80,12 +78,15 @@ class RunFile:
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
         self.path, self._writable = Path(path), mode == "a"
-        self._unsaved, self._sound, self._next_save = False, True, 0.0
+        self.saved, self._sound, self._next_save = True, True, 0.0
         self._file = open_sealed(self.path, self._writable)
         if "snapshot" in self._file:
             self._file.close()
-            says = f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own"
-            raise PackingFileError(f"{says}: spectrum, draw, view and export take it.")
+            raise PackingFileError(
+                f"{self.path} holds a packing as LAMMPS left it, and no run of ours: spectrum, draw take it."
+            )
+        with telling(self.path, "holds no run"):
+            self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
 
     @classmethod
     def create(
@@ -128,9 +129,6 @@ class RunFile:
         """Number of equilibria; frames of a trajectory do not count."""
         return len(self._file[f"{POSITION}/step"]) - len(self._file.get("faultgouge/trajectory/time", ()))
 
-    def __enter__(self) -> RunFile:
-        return self
-
     def __exit__(self, *error: object) -> None:
         self.close()
 
@@ -142,10 +140,10 @@ class RunFile:
 
     def save(self) -> None:
         """Write all changes to the file on the disk."""
-        if self._writable and self._unsaved and self._sound:
+        if not self.saved and self._sound:
             begin = monotonic()
             write_sealed(self.path, self._file)
-            self._unsaved, self._next_save = False, monotonic() + (monotonic() - begin) / SHARE_OF_SAVING
+            self.saved, self._next_save = True, monotonic() + (monotonic() - begin) / SHARE_OF_SAVING
 
     @contextmanager
     def change(self) -> Iterator[None]:
@@ -155,21 +153,16 @@ class RunFile:
         """
         if not self._writable:
             raise ValueError(f"{self.path} is open for reading alone.")
-        outer, self._sound, self._unsaved = self._sound, False, True
+        outer, self._sound, self.saved = self._sound, False, False
         yield
         self._sound = outer
         if outer and monotonic() >= self._next_save:
             self.save()
 
     @property
-    def saved(self) -> bool:
-        """Whether the stored file has all changes."""
-        return not self._unsaved
-
-    @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the root: scene, versions, seed, ranks."""
-        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
+        return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in self._file.attrs.items()}
 
     def put_attribute(self, name: str, value: str) -> None:
         """Set an attribute of the root."""
@@ -183,9 +176,8 @@ class RunFile:
 
     @complete.setter
     def complete(self, value: bool) -> None:
-        self._unsaved |= self.complete != value
-        if self._unsaved:
-            self._file.attrs["complete"] = value
+        if self.complete != value or not self.saved:
+            self._file.attrs["complete"], self.saved = value, False
 
     def put_checkpoint(self, **arrays: NDArray | int) -> None:
         """Keep the state of a run that is under way, in place of the last one; none for a run that is over."""
@@ -233,10 +225,10 @@ class RunFile:
                 raise ValueError(f"{self.path} was begun for a packing with another {name}.")
         if "trajectory" in self.names_of_series:
             raise ValueError(f"{self.path} has a trajectory, behind which no equilibrium can follow.")
-        contacts = [each for each in (c.i, c.j, c.slip, c.slip_low) if each is not None]
         frame = scalars | {name: getattr(packing, name) for name in ("angle", "fx", "fy", "residual")}
-        frame |= {"contacts": np.column_stack(contacts)}
-        frame |= {} if packing.position_low is None else {"position_low": packing.position_low}
+        frame["contacts"] = np.column_stack([each for each in (c.i, c.j, c.slip, c.slip_low) if each is not None])
+        if packing.position_low is not None:
+            frame["position_low"] = packing.position_low
         if count and set(frame) != set(self.observables):
             raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
         parts = {f"observables/{name}": np.asarray(value) for name, value in frame.items()}
@@ -256,10 +248,9 @@ class RunFile:
     def _begin(self, name: str, value: NDArray) -> None:
         """Make an element of H5MD for values such as one of a frame; contacts may become more."""
         group, whole = self._file.create_group(name), np.issubdtype(value.dtype, np.integer)
-        layout = dict(COMPACT if value.ndim else CHECKSUM) | {"fillvalue": 0 if whole else np.nan}
-        chunks = (1, *value.shape) if value.size > 1 else True
-        shape, most = (0, *value.shape), (None,) * (value.ndim + 1)
-        group.create_dataset("value", shape, np.int64 if whole else float, maxshape=most, chunks=chunks, **layout)
+        layout = dict(COMPACT if value.ndim else CHECKSUM) | {"chunks": (1, *value.shape) if value.size > 1 else True}
+        layout |= {"fillvalue": 0 if whole else np.nan, "maxshape": (None,) * (value.ndim + 1)}
+        group.create_dataset("value", (0, *value.shape), np.int64 if whole else float, **layout)
         for clock in ("step", "time"):
             group[clock] = self._file[f"{POSITION}/{clock}"]
 
@@ -281,22 +272,21 @@ class RunFile:
 
         Raises PackingFileError if there is no such frame.
         """
-        count = len(self)
+        count, given = len(self), self._parameters
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
-        frame, given = frame % count, dict(self._parameters)
-        seen = {name: self._file[f"observables/{name}/value"][frame] for name in ("contacts", "angle", "fx", "fy")}
+        seen = {name: self.observable(name)[frame % count] for name in ("contacts", "angle", "fx", "fy")}
+        if "position_low" in self.observables:
+            seen["position_low"] = self.observable("position_low")[frame % count]
         rows = seen.pop("contacts")
-        rows, low = rows[~np.isnan(rows[:, 0])], self._file.get("observables/position_low/value")
         known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
         names = ("radius", "mass", "inertia_factor", "box_length", "drag_time", "spring")
         with telling(self.path, "is damaged", ValueError):  # numbers that no packing has
-            i, j = rows[:, :2].T.astype(np.int64)
-            contacts = Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None)
+            i, j, *slip = rows[~np.isnan(rows[:, 0])].T
             return Packing(
-                position=self._file[f"{POSITION}/value"][frame, :, :2], contacts=contacts, slips_known=known,
+                position=self._file[f"{POSITION}/value"][frame % count, :, :2], slips_known=known,
+                contacts=Contacts(i.astype(np.int64), j.astype(np.int64), *slip),
                 law=law_of_parameters(given), top=given["top"].astype(bool),
-                position_low=None if low is None else low[frame],
                 **seen, **{name: given[name] for name in names if name in given},
             )  # fmt: skip
 
@@ -311,17 +301,17 @@ class RunFile:
             Centres, length, and their low parts if there are any.
         """
         begin, place = len(self._file[f"{POSITION}/step"]), np.pad(position, ((0, 0), (0, 0), (0, 1)))
-        steps = np.arange(begin, begin + len(place))
+        new = {"value": place, "time": time, "step": np.arange(begin, begin + len(place))}
         with self.change():
-            low = {} if position_low is None else {"position_low": position_low}
-            self.append_series("trajectory", time=time, **low)
-            rows = self._rows_of_frames
-            for data in rows.values():
+            self.append_series(
+                "trajectory", time=time, **({} if position_low is None else {"position_low": position_low})
+            )
+            for name, data in self._rows_of_frames.items():
                 data.resize(begin + len(place), axis=0)
-            for name, values in {"value": place, "time": time, "step": steps}.items():
-                rows[f"{POSITION}/{name}"][begin:] = values
-            for name in {"observables/fx/value", "observables/fy/value", f"{EDGES}/value"} & rows.keys():
-                rows[name][begin:] = rows[name][begin - 1]
+                if name.startswith(POSITION):
+                    data[begin:] = new[name.rpartition("/")[2]]
+                elif name in ("observables/fx/value", "observables/fy/value", f"{EDGES}/value"):
+                    data[begin:] = data[begin - 1]
 
     def append_series(self, name: str, **columns: ArrayLike) -> None:
         """Add rows to a time series, which begins with the first call.
@@ -358,11 +348,6 @@ class RunFile:
             columns["position"] = self._file[f"{POSITION}/value"][len(self) :, :, :2]
         return columns
 
-    @cached_property
-    def _parameters(self) -> dict[str, Any]:
-        """What all frames share: written once, when the file is made."""
-        return {name: item[()] for name, item in self._file["parameters"].items()}
-
 
 def _extend(data: h5py.Dataset, rows: NDArray, start: int) -> None:
     """Write rows from a number on, in place of what is there; further axes grow as they must."""
@@ -379,15 +364,18 @@ def _rows(group: h5py.Group) -> int:
 
 
 def law_parameters(law: MindlinLaw) -> dict[str, float]:
-    """kn, kt, mu, and the parameters of the law that differ from `LAW_DEFAULTS`."""
-    more = {name: float(getattr(law, name)) for name, other in LAW_DEFAULTS.items() if getattr(law, name) != other}
-    return {"kn": law.kn, "kt": law.kt, "mu": law.mu} | more
+    """kn, kt, mu, and the parameters of the law that differ from their defaults."""
+    usual = MindlinLaw(law.kn, law.kt, law.mu)
+    given = {name: getattr(law, name) for name in MindlinLaw.__dataclass_fields__}
+    return {
+        name: float(value) for name, value in given.items() if name in NEEDED_BY_LAW or value != getattr(usual, name)
+    }
 
 
 def law_of_parameters(given: Mapping[str, Any]) -> MindlinLaw:
     """The reverse of `law_parameters`; a KeyError if kn, kt or mu is missing."""
-    more = {name: given[name] for name in LAW_DEFAULTS if name in given}
-    return MindlinLaw(given["kn"], given["kt"], given["mu"], **more)
+    names = [name for name in MindlinLaw.__dataclass_fields__ if name in given or name in NEEDED_BY_LAW]
+    return MindlinLaw(**{name: given[name] for name in names})
 
 
 def parameters_of(packing: Packing) -> dict[str, Any]:

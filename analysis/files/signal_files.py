@@ -38,15 +38,15 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
         content = read_plain(path)
     except OSError as error:
         raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
-    # a table is text whose first line that is no comment begins with a number
     lines = content.decode("ascii", "ignore").replace(",", " ").splitlines()
-    _, words = next(strip_comments(lines, 1), (0, [""]))
+    rows = list(strip_comments(lines, 1))
     try:
-        if b"\0" in content or not re.match(r"[-+]?\.?\d|[-+]?(nan|inf)", words[0], re.IGNORECASE):
+        # a table is text whose first line that is no comment begins with a number
+        if b"\0" in content or not rows or not re.match(r"[-+]?\.?\d|[-+]?(nan|inf)", rows[0][1][0], re.IGNORECASE):
             return of_trace(_record(path, channel))
         if channel is not None:
             raise SignalError("a table of two columns has no channels: leave channel out")
-        rows, wanted = strip_comments(lines, 1), "two are needed, time and value"
+        wanted = "two are needed, time and value"
         return Signal(*columns_of(path, rows, ("time", "value"), wanted, more=False).values())
     except PackingFileError as error:
         raise SignalError(str(error).rstrip(".")) from None
@@ -66,17 +66,15 @@ def _record(path: Path, channel: str | None) -> Any:
 
         traces = list(read(str(path)))
     except ImportError:
-        needs = 'and ObsPy, which reads records, is not installed: pip install "faultgouge[seismic]"'
-        raise SignalError(f"it is no table of two columns, {needs}") from None
+        raise SignalError('it is no table of two columns; records need pip install "faultgouge[seismic]"') from None
     except Exception as error:  # whatever the reader of the format raises on a broken file
         reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
-        says = f"it is no table of two columns, and ObsPy cannot read it ({reason}): give another file"
-        raise SignalError(says) from None
-    names = ", ".join(dict.fromkeys(trace.id for trace in traces))
+        raise SignalError(f"it is no table of two columns, and no record ({reason}): give another file") from None
     found = [trace for trace in traces if channel is None or trace.id.endswith(channel)]
     if len(found) != 1:
         fits = "it has" if channel is None else f'channel = "{channel}" fits {len(found) or "none"} of'
-        raise SignalError(f"{fits} the traces {names or 'none'}: name one of them with channel")
+        names = ", ".join(dict.fromkeys(trace.id for trace in traces)) or "none"
+        raise SignalError(f"{fits} the traces {names}: name one of them with channel")
     return found[0]
 
 

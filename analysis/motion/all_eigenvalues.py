@@ -136,24 +136,11 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
 def eigenvalues_about(
     matrix: csc_array, shift: float, wanted: Floats, accuracy: float, vectors: tuple[int, int, int]
 ) -> tuple[Complexes, Modes, int]:
-    """All eigenvalues about a shift, and those that matter with vectors; and how many vectors would have been enough.
+    """All eigenvalues about a shift, at least of real parts between two `wanted` ones, and those that matter with
+    vectors; and how many vectors would have been enough.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (n, n)
-        A, its coordinates in the order of elimination.
-    shift : float
-    wanted : ndarray, shape (2,)
-        Real parts between which all are wanted.
-    accuracy : float
-        Error of an eigenvalue by one space.
-    vectors : tuple of int
-        Vectors of a block, of the spaces before their eigenvalues are looked at, and at the most.
-
-    Raises
-    ------
-    SpectrumError
-        If the largest space does not hold them.
+    `accuracy` is the error of an eigenvalue by one space, and `vectors` are those of a block, of the spaces before
+    their eigenvalues are looked at, and at the most. A SpectrumError if the largest space does not hold them.
     """
     (block, first, most), (low, high) = vectors, wanted
     size = matrix.shape[0]

@@ -65,15 +65,10 @@ and to a hundredth where the two displacements have nothing in common."""
 
 
 class OneSidedSystem:
-    """The equations of one configuration, in mass-weighted coordinates.
+    """The equations of one configuration, in mass-weighted coordinates, by K and C of sticking contacts.
 
     A state has several motions, in columns: `time`, displacement `z` and velocity `v`, shape (E, P), and what contacts
     remember: `p` of sliders, shape (B, P), and `r`, shape (R, P), of contacts with two derivatives.
-
-    Parameters
-    ----------
-    motion : Motion
-        K and C of sticking contacts, `Motion.of(packing, sliding=False)`.
 
     Attributes
     ----------
@@ -131,13 +126,8 @@ class OneSidedSystem:
     def steps(
         self, state: SimpleNamespace, time_step: float, rise: Floats | None = None, constant: Floats | float = 0.0
     ) -> Iterator[SimpleNamespace]:
-        """One step of velocity Verlet after the other, each of which changes the state.
-
-        Parameters
-        ----------
-        rise, constant : ndarray, shape (E, P), optional
-            Mass-weighted forces, per time, and those that are always there.
-        """
+        """One step of velocity Verlet after the other, each of which changes the state; with mass-weighted forces that
+        rise, per time, and those that are always there."""
         force = self._force(state, rise) + constant
         while True:
             state.v += 0.5 * time_step * force
@@ -195,26 +185,17 @@ def follow(
 ) -> Iterator[SimpleNamespace]:
     """What motions have done so far, after one span of time after the other; every stable step is looked at.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        The equations.
-    velocity : ndarray, shape (coordinates, P)
-        Of the start.
-    span : float
-        Time, of which `LOOKS_PER_CHUNK` rows are kept.
-    rise : ndarray, shape (E, P), optional
-        Mass-weighted forces that rise, per time.
-    beside : bool
-        Whether two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
-        residual forces.
+    `velocity` of the start has all coordinates, and `rise`, mass-weighted forces per time, those of the motion. With
+    `beside` two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
+    residual forces.
 
     Yields
     ------
     SimpleNamespace
-        Rows, one a look, L so far: `time`, shape (L,); mean kinetic energies `energy`, largest D `size`; `first`, the
-        smallest multiples of the motions that take a contact to another state, and `size_at_first`, their D there,
-        shape (L, P); and `slid` and `paths`, p and r at the end of the look, shapes (L, B, P) and (L, R, P).
+        Rows, one a look, `LOOKS_PER_CHUNK` a span, L so far: `time`, shape (L,); mean kinetic energies `energy`,
+        largest D `size`; `first`, the smallest multiples of the motions that take a contact to another state, and
+        `size_at_first`, their D there, shape (L, P); and `slid` and `paths`, p and r at the end of the look, shapes
+        (L, B, P) and (L, R, P).
     """
     if beside:
         velocity = np.hstack([velocity, np.zeros((len(velocity), 2))])
@@ -358,12 +339,7 @@ def _advance_exactly(motion: Motion, state: SimpleNamespace, time: float, rise: 
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces on particles, shape (N, d), on all coordinates, shape (coordinates, 1): a sum where several move as one.
 
-    "fx" is a unit force on each particle of the upper layer along x.
-
-    Raises
-    ------
-    ValueError
-        If the shape does not fit, or there is no upper layer.
+    "fx" is a unit force on each particle of the upper layer along x; ValueError without one, or of another shape.
     """
     if isinstance(rise, str):
         if rise != "fx" or not configuration.top.any():

@@ -43,6 +43,7 @@ force opposes it, as in a periodic box. Any other motion that no force opposes l
 nor decays in these steps; motion that grows in spite of dashpots grows faster in longer steps, which s does not.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -55,7 +56,7 @@ from ..factors.sparse_lu import SingularMatrixError, general_lu, negative_pivots
 from ..progress import report_progress
 from .eigenvalues import Linear, exponential
 from .motion import Motion
-from .slow_motions import SlowMotions, slow_motions
+from .slow_motions import slow_motions
 from .stable_timestep import stable_timestep
 
 CHANCE = 1e-3
@@ -83,7 +84,7 @@ def follow(
     looks: float,
     patience: float = np.inf,
     wanted: float = SEEN,
-    slow: SlowMotions | None = None,
+    leave: Callable[[Floats], Floats] | None = None,
 ) -> tuple[Linear, float, float]:
     """Follow a motion until it has decayed, or grows.
 
@@ -101,8 +102,8 @@ def follow(
         How many times that motion may need to decay: otherwise it is given up after a tenth.
     wanted : float
         ln |u|^2 at which motion has decayed.
-    slow : SlowMotions, optional
-        Motions that are known to decay, and are taken out.
+    leave : callable, optional
+        Takes motions that are known to decay out of u.
 
     Returns
     -------
@@ -125,8 +126,8 @@ def follow(
 
     logs, needed = [float(np.log(square()))], np.inf
     while len(logs) <= max(looks, 8):
-        if slow is not None:  # at each look: long steps turn them a little
-            kept = slow.leave(np.concatenate([reference * z.ravel(), v.ravel()])).reshape(2, *z.shape)
+        if leave is not None:  # at each look: long steps turn them a little
+            kept = leave(np.concatenate([reference * z.ravel(), v.ravel()])).reshape(2, *z.shape)
             z[:], v[:] = kept[0] / reference, kept[1]
         size = float(np.abs(v).max(initial=0.0)) or 1.0  # growth may be beyond all numbers
         x /= size
@@ -287,18 +288,19 @@ def follow_decay(
     stiffness, damping = (csr_array(kept.T @ each @ kept) for each in (a, g))
     report_progress("the slowest motions are looked for")
     slow = slow_motions(stiffness, damping, kept, reference, common)
-    slowest = None if slow is None else int(np.argmax(slow.s.real))
-    if slow is not None and slow.s[slowest].real > 0:
-        s = complex(slow.s[slowest])
-        return Linear(False, 2 * s.real, 2 * float(slow.error[slowest]), free, s, at_least=True)
+    values, errors, leave = slow or (np.full(1, -np.inf + 0j), np.zeros(1), None)
+    slowest = int(np.argmax(values.real))
+    s, rate, error = complex(values[slowest]), 2 * float(values[slowest].real), 2 * float(errors[slowest])
+    if rate > 0:
+        return Linear(False, rate, error, free, s, at_least=True)
     wanted = _oscillating(stiffness, damping, common, reference)
     # a step takes the time of 2e4 multiplications at the least
     looks = work / (100 * (2e4 + a.nnz + g.nnz)) if time is None else time / (100 * STEP * limit)
-    found, now, needed = follow(a, g, limit, state, looks, 1.0 if time is None else np.inf, wanted, slow)
-    if slow is not None and found.stable and (s := complex(slow.s[slowest])).real > 0.5 * found.growth_rate:
-        count, rate = np.count_nonzero(slow.s.imag >= 0), exponential(2 * s.real, 6)
-        said = f"of {count} slow motions, known one by one, the slowest decays with {rate}, and other {found.said}"
-        found = replace(found, growth_rate=2 * s.real, error=2 * float(slow.error[slowest]), s=s, said=said)
+    found, now, needed = follow(a, g, limit, state, looks, 1.0 if time is None else np.inf, wanted, leave)
+    if found.stable and rate > found.growth_rate:
+        decays = f"the slowest decays with {exponential(rate, 6)}, and other {found.said}"
+        said = f"of {np.count_nonzero(values.imag >= 0)} slow motions, known one by one, {decays}"
+        found = replace(found, growth_rate=rate, error=error, s=s, said=said)
     if found.stable is not None:
         return replace(found, free=free)
     bound = min(searched, found.searched)

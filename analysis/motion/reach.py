@@ -58,12 +58,7 @@ OVERLAP_CHANGE = 0.1
 def reach_of(system: OneSidedSystem, free: int = 0) -> FieldsByName | None:
     """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of a configuration without contacts at Coulomb's bound.
-    free : int
-        Motions that no force opposes.
+    No contact is at Coulomb's bound, and `free` motions no force opposes.
 
     Returns
     -------
@@ -98,10 +93,7 @@ def reach_of(system: OneSidedSystem, free: int = 0) -> FieldsByName | None:
 
 @np.errstate(divide="ignore", invalid="ignore")
 def _radius(system: OneSidedSystem, factors: Factors) -> float:
-    """The smallest root of 2 E with which a contact changes.
-
-    Contacts alone bound their share of S^-1, so that only those are solved for that may be the first.
-    """
+    """The smallest root of 2 E with which a contact changes: only those are solved for that may be the first."""
     c, changes = system.configuration.contacts, system.changes
     count, rows, viscous = len(c), csr_array(changes.rows), csr_array(changes.viscous)
     dashpots = [viscous[i * count : (i + 1) * count] for i in range(3)]
@@ -138,10 +130,8 @@ def _radius(system: OneSidedSystem, factors: Factors) -> float:
 
 
 def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
-    """The smallest (mu f_n - f_t cos phi) / |n| of each contact, shape (C,), with n = (cos phi, sin phi, -1).
-
-    Norms are those of the products, shape (3, 3, C).
-    """
+    """The smallest (mu f_n - f_t cos phi) / |n| of each contact, n = (cos phi, sin phi, -1), in the norms of products
+    of shape (3, 3, C)."""
     angle = np.linspace(-np.pi, np.pi, 4097)  # half of the way from one to the next counts for 1e-6
     n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
     size = np.sqrt(np.maximum(np.einsum("ia,ijc,ja->ca", n, product, n, optimize=True), 0.0))

@@ -89,20 +89,10 @@ def motion_under_load(
 ) -> FieldsByName:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of a configuration in which no small motion is known to grow.
-    direction : ndarray, shape (coordinates, 1)
-        Forces per unit of time.
-    time : float, optional
-        How long motion is followed; until it is steady by default.
-    free : int
-        Motions that no force opposes.
-    decays : bool
-        Whether it is known that no motion grows with sticking contacts: otherwise motion is followed.
-    residual : float
-        Root mean square displacement of the particles by the residual forces, length.
+    No small motion is known to grow. `direction` has forces per unit of time, shape (coordinates, 1), `free` motions no
+    force opposes, and `residual` is the root mean square displacement of the particles by the residual forces, length.
+    The motion is followed for the time, or until it is steady; where it is known that motion with sticking contacts
+    `decays` the drift may be solved for.
 
     Returns
     -------
@@ -171,17 +161,7 @@ def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats 
 
 
 def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
-    """v of A v = load, without the motions that no force opposes, shape (E, P).
-
-    Parameters
-    ----------
-    motion : Motion
-        A.
-    load : ndarray, shape (E, P)
-        Mass-weighted forces.
-    free : int
-        Motions that no force opposes.
-    """
+    """v of A v = load, mass-weighted forces of shape (E, P), without the motions that no force opposes, so many."""
     matrix = motion.stiffness
     shift = 1e-11 * float(np.abs(matrix.data).max(initial=0.0))  # free motions do not divide by zero
     if free:
@@ -231,18 +211,10 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
 
 
 def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Window]:
-    """One window after the other under a load that rises, from two starts: with a drag on all coordinates, and on all
-    but rotations, as one packing may vibrate in two ways. Large packings, and bodies, whose coordinates are of another
-    kind, have one start.
+    """One window after the other, each of a `length` of time, under a load that rises (mass-weighted, shape (E, 1)).
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    load : ndarray, shape (E, 1)
-        Mass-weighted forces per unit of time.
-    length : float
-        Time of a window; the drag fades out in `FADE_WINDOWS` of them.
+    From two starts: with a drag on all coordinates, and on all but rotations, as one packing may vibrate in two ways.
+    Large packings, and bodies, whose coordinates are of another kind, have one start.
     """
     c = system.configuration
     spins = system.motion.active[:, None] >= c.dimension * len(c)
@@ -303,16 +275,8 @@ def next_change(
 ) -> tuple[float | None, str | None]:
     """At which increase of the load a contact changes first, and what it does; None twice if none is known.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    velocity : ndarray, shape (E, 1)
-        Mean mass-weighted velocity at the rate 1.
-    slid : ndarray, shape (B, 1)
-        Mean rates at which contacts at the bound slide, force.
-    paths : ndarray, shape (R, 1)
-        Mean rates of the paths of the overlaps of contacts with two derivatives.
+    By the mean mass-weighted velocity at the rate 1, shape (E, 1), and the mean rates at which contacts at the bound
+    slide, force, (B, 1), and of the paths of the overlaps of contacts with two derivatives, (R, 1).
     """
     if system.configuration.stiffness is not None:
         return None, None

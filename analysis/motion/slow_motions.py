@@ -16,7 +16,7 @@ hundredth of :math:`|\mathrm{Re}\, s|` at the most, the l of a motion that does 
 common with x. (Saad, *Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 6 to 8.)
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg import eig, schur
@@ -30,30 +30,9 @@ KRYLOV = 300
 """Vectors of a Krylov space: of 8,000 spheres in a box it holds the twelve shear waves and all that is slower."""
 
 
-class SlowMotions(NamedTuple):
-    """The slowest motions.
-
-    Attributes
-    ----------
-    s : ndarray of complex, shape (k,)
-        Eigenvalues but those of drift, 1 / time.
-    error : ndarray, shape (k,)
-        Of s, 1 / time.
-    right, left : ndarray, shape (2n, m)
-        X and Y, with Y^T X = 1, drift among them.
-    """
-
-    s: Complexes
-    error: Floats
-    right: Floats
-    left: Floats
-
-    def leave(self, states: Floats) -> Floats:
-        """States u without these motions, shape (2n,) or (2n, k)."""
-        return np.asarray(states - self.right @ (self.left.T @ states))
-
-
-def slow_motions(a: csr_array, g: csr_array, kept: csr_array, reference: float, drifts: int) -> SlowMotions | None:
+def slow_motions(
+    a: csr_array, g: csr_array, kept: csr_array, reference: float, drifts: int
+) -> tuple[Complexes, Floats, Callable[[Floats], Floats]] | None:
     """The slowest motions; None if the Krylov spaces do not hold any to a hundredth of its decay.
 
     Parameters
@@ -66,6 +45,15 @@ def slow_motions(a: csr_array, g: csr_array, kept: csr_array, reference: float, 
         omega_0, 1 / time: a tenth of it is the shift.
     drifts : int
         Motions that no force opposes.
+
+    Returns
+    -------
+    s : ndarray of complex, shape (k,)
+        Eigenvalues but those of drift, 1 / time.
+    error : ndarray, shape (k,)
+        Of s, 1 / time.
+    leave : callable
+        Takes these motions and drift out of a state u, shape (2m,).
     """
     shift, size = 0.1 * reference, a.shape[0]
     try:
@@ -93,7 +81,7 @@ def slow_motions(a: csr_array, g: csr_array, kept: csr_array, reference: float, 
 
     spaces = []
     for operator in (inverse, inverse_transposed):
-        space = BlockKrylov(operator, np.random.default_rng(0).standard_normal((6, 2 * size)), min(KRYLOV, size))
+        space = BlockKrylov(operator, np.random.default_rng(0).standard_normal((6, 2 * size)), min(KRYLOV, 2 * size))
         space.extend(space.most)
         values, vectors = eig(space.square)
         order = np.argsort(-np.abs(values))
@@ -127,4 +115,4 @@ def slow_motions(a: csr_array, g: csr_array, kept: csr_array, reference: float, 
     if np.any(error > 0.01 * np.abs(s.real)):
         return None
     right, left = (np.vstack([kept @ half for half in np.split(each, 2)]) for each in (right, left))
-    return SlowMotions(s, error, right, left)
+    return s, error, lambda states: states - right @ (left.T @ states)

@@ -9,14 +9,10 @@ All vectors here are in the mass-weighted coordinates :math:`M^{1/2} q`, in whic
 M^{-1/2}`. A is symmetric if K is symmetric, and then every eigenvalue has condition number one.
 
 K is not symmetric, and real eigenvalues may coalesce and leave the axis as a pair
-:math:`\lambda = \lambda_R \pm i\lambda_I`. Then :math:`\omega = \pm\omega_R \pm i\omega_I`, one motion of
-each pair grows as :math:`e^{|\omega_I| t}`, and the mean square displacement as :math:`e^{2 |\omega_I| t}`.
-"Growth rate" means :math:`2 |\mathrm{Im}\,\omega|` throughout, the rate of the square.
-
-**Negative eigenvalues.** A real :math:`\lambda < 0` is the classical instability (buckling): :math:`\omega` is
-imaginary, and the motion leaves the equilibrium without oscillation. A branch of equilibria passes through
-:math:`\lambda = 0` at a turning point; Newton's method can land beyond the turning point, on equilibria that no packing
-reaches by itself. A packing is linearly stable only if it has neither complex pairs nor negative eigenvalues.
+:math:`\lambda = \lambda_R \pm i\lambda_I`. One motion of each pair grows as :math:`e^{|\mathrm{Im}\,\omega| t}`, and
+the mean square displacement as the square of that: "growth rate" means :math:`2 |\mathrm{Im}\,\omega|` throughout. A
+real :math:`\lambda < 0` is the classical instability (:mod:`~faultgouge.analysis.motion.buckling`). A packing is
+linearly stable only if it has neither complex pairs nor negative eigenvalues.
 
 **Noise.** A backward stable solver returns the eigenvalues of :math:`A + E` with :math:`|E| \sim u |A|`, u
 the unit roundoff, and a simple eigenvalue with unit right and left vectors x, y moves by :math:`\kappa |E|`,
@@ -121,19 +117,15 @@ class Spectrum(TableDisplay):
         verdict = {None: "eigenvalues do not decide", True: "no motion grows", False: "unstable"}[self.is_stable]
         if doubts := "; ".join(no_verdict(self.packing.configuration)):
             verdict = f"not known whether the packing is stable: {doubts}"
-        real = self.eigenvalues.real
-        span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
-        numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
+        numbers = f"{counted(len(self.eigenvalues), 'eigenvalue')} of K, {counted(len(self.rattlers), 'rattler')}"
         return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}>"
 
     def _rows(self) -> dict[str, str]:
-        rows = {
-            f"{pair.eigenvalue.real:.10g} \u00b1 {pair.eigenvalue.imag:.6g} i": (
-                f"2 |Im \u03c9| = {pair.growth_rate:.6g}, participation {pair.participation:.3f}, "
-                f"rotation {pair.rotation:.3f}"
-            )
-            for pair in self.pairs
-        }
+        rows = dict[str, str]()
+        for pair in self.pairs:
+            shares = f"participation {pair.participation:.3f}, rotation {pair.rotation:.3f}"
+            value = f"{pair.eigenvalue.real:.10g} \u00b1 {pair.eigenvalue.imag:.6g} i"
+            rows[value] = f"2 |Im \u03c9| = {pair.growth_rate:.6g}, {shares}"
         rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
         return rows or {"complex pairs and negative eigenvalues of K": "none"}
 
@@ -277,8 +269,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
     below = is_negative(marked.values, overlap, rounding, zero)
     resists = below | ~is_zero(marked.values, overlap, alike, zero)
-    near_zero, not_free = np.abs(values) <= alike, resists & (np.abs(marked.values) <= alike)
-    free = int(near_zero.sum() - not_free.sum())
+    drift = np.count_nonzero(np.abs(values) <= alike) - np.count_nonzero(resists & (np.abs(marked.values) <= alike))
     below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     noise = int(np.count_nonzero(marked.values.imag > 0))
@@ -289,16 +280,13 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
         _sorted(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
-        rattlers=packing.rattlers, rounding=rounding, free=free, packing=packing,
+        rattlers=packing.rattlers, rounding=rounding, free=int(drift), packing=packing,
     )  # fmt: skip
 
 
 def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes]:
-    """All eigenvalues, and those with vectors.
-
-    Vectors are known at least of eigenvalues that are complex, or negative beyond rounding, and up to `SLICED`
-    coordinates of those that may be zero by forces that are out of balance: up to `alike`, but not by rounding.
-    """
+    """All eigenvalues, and with vectors at least those that are complex, or negative beyond rounding, or up to `SLICED`
+    coordinates zero by forces out of balance."""
     if matrix.shape[0] > SLICED:
         return all_eigenvalues(matrix)
     dense = matrix.toarray()

@@ -31,18 +31,14 @@ decay by a factor.
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
 largest eigenvalue is :math:`\mu^2`. Masses are applied to vectors, and K + mu C is one matrix.
 
-**What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is. No iteration
-can prove that this eigenvalue is the largest. Of many coordinates there is one Krylov space, and its first vector is
-random. For a symmetric matrix of n rows, m products miss more than a share epsilon of the largest eigenvalue with a
-probability below :math:`1.648 \sqrt n\, e^{-(2m - 1)\sqrt\epsilon}` (Kuczynski and Wozniakowski, SIAM J. Matrix Anal.
-Appl. 13, 1094, 1992). The error of the step follows from this epsilon.
+**What is guaranteed.** For symmetric K and C the residual of the iteration says how far an eigenvalue is, and not
+that it is the largest. From a random start, m products with a symmetric matrix of n rows miss more than a share epsilon
+of the largest eigenvalue with a probability below :math:`1.648 \sqrt n\, e^{-(2m - 1)\sqrt\epsilon}` (Kuczynski and
+Wozniakowski, SIAM J. Matrix Anal. Appl. 13, 1094, 1992), which gives the error of the step of many coordinates.
 
-What is sure is that no eigenvalue exceeds the largest sum of a row in absolute value (Gershgorin). With k and c these
-sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
-
-.. math:: \mu^2 \le k + \mu c, \qquad \mu \le \tfrac12 \left(c + \sqrt{c^2 + 4k}\right) .
-
-The step 2/mu of this bound is stable for certain, and shorter than the limit.
+No eigenvalue exceeds the largest sum of a row in absolute value (Gershgorin): with k and c these sums of
+:math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`, :math:`\mu \le \tfrac12 (c + \sqrt{c^2 + 4k})`. The step
+2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
 import numpy as np

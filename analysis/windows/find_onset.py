@@ -14,7 +14,7 @@ from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..progress import Watch, report_progress, show_progress
+from ..progress import report_progress, show_progress
 from .motions import System, force_bearing
 from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
 from .quiet import Quiet
@@ -120,7 +120,6 @@ def find_onset(
     *,
     dissipation: bool = False,
     first: bool = False,
-    watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
     limits: Limits = LIMITS,
@@ -147,8 +146,6 @@ def find_onset(
     first : bool
         Seek only the first window. No equilibrium beyond the increment in which it begins is then asked for. The end of
         the window is None if it lies beyond this increment.
-    watch : callable, optional
-        Told in words which part of a large packing is being searched.
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
     folder : Path, optional
@@ -237,18 +234,17 @@ def find_onset(
         middles = [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
         return [each.fx_onset for each in windows if below < each.fx_onset < above] + middles
 
-    with show_progress(watch):
-        if not dissipation:
-            return undamped_onset()
-        beside: Onset | None = None
-        with suppress(OnsetError, NoEquilibriumError), show_progress(what="without dissipation, "):
-            beside = undamped_onset()
-        with show_progress(what="with dissipation, "):
-            windows, doubtful = windows_of(lambda fx: System.of(at(fx), True), inside)
-        if not windows:
-            finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
-            raise NoGrowthError(finding, "raise the largest load", undamped=beside)
-        return Onset(windows, takes_all and not first, doubtful, undamped=beside)
+    if not dissipation:
+        return undamped_onset()
+    beside: Onset | None = None
+    with suppress(OnsetError, NoEquilibriumError), show_progress(what="without dissipation, "):
+        beside = undamped_onset()
+    with show_progress(what="with dissipation, "):
+        windows, doubtful = windows_of(lambda fx: System.of(at(fx), True), inside)
+    if not windows:
+        finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
+        raise NoGrowthError(finding, "raise the largest load", undamped=beside)
+    return Onset(windows, takes_all and not first, doubtful, undamped=beside)
 
 
 def _unstable_at_start(start: HasConfiguration, buckles: bool) -> Spectrum | None:

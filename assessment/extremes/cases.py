@@ -49,21 +49,8 @@ Measured = tuple[float, float, str]
 
 
 class Case(NamedTuple):
-    """Something to try.
-
-    Attributes
-    ----------
-    group : str
-        The kind of trouble.
-    name : str
-        What is tried.
-    run : callable
-        Collective over the ranks, with the same result on each: what was measured.
-    quick : bool
-        Whether it belongs to the small part of the cases.
-    refusal : str
-        Words of the sentence of one line with which it must be refused; empty where it must hold.
-    """
+    """Something to try: `run` is collective over the ranks, with the same result on each. The quick cases are a small
+    part. `refusal` has words of the sentence of one line with which it must be refused; empty where it must hold."""
 
     group: str
     name: str
@@ -218,7 +205,7 @@ def geometry() -> Iterator[Case]:
         ("box 2 wide", partial(crystal, 2), "under two largest diameters"),
         ("one centre", lambda: stiffness_matrix(disks((3.0, 3.0), (3.0, 3.0), slip=0.0)), "same centre"),
         ("a coordinate that is no number", lambda: disks((3.0, np.nan), (9.0, 9.0), slip=0.0), "not finite"),
-        ("k_n infinite", lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
+        ("k_n infinite", lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be positive"),
     ):
         yield case(name, make, True, words)
 

@@ -22,19 +22,16 @@ from ...analysis import MindlinLaw, Packing, touching
 from ...analysis.arrays import Floats
 from ...pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
-KN = 2e5
-"""Normal stiffness of the paper."""
-LOAD = 1.5e-5
-"""F_y in units of k_n times length^(3/2), the paper's."""
+KN, LOAD = 2e5, 1.5e-5
+"""Normal stiffness of the paper, and its F_y in units of k_n times length^(3/2)."""
 
 
 def law(kn: float = KN, kt_share: float = 2 / 7, mu: float = 1.0) -> MindlinLaw:
-    """A law by its k_t / k_n."""
+    """A law by its k_t / k_n; the paper's by default."""
     return MindlinLaw(kn, kt_share * kn, mu)
 
 
 PAPERS = law()
-"""The paper's law."""
 
 
 def crystal(
@@ -92,14 +89,13 @@ def with_low_parts(packing: Packing) -> Packing:
     return replace(packing, position_low=np.zeros_like(packing.position), contacts=contacts)
 
 
-def at_rest(packing: Packing) -> Equilibrium:
-    """The equilibrium at F_x = 0."""
+def at_rest(packing: Packing, fx: float = 0.0) -> Equilibrium:
+    """The equilibrium at F_x = 0, or at a force after that."""
     with Engine(packing) as engine:
-        return equilibrate(engine, Equilibrium.of(packing), 0.0)
+        rest = equilibrate(engine, Equilibrium.of(packing), 0.0)
+        return equilibrate(engine, rest, fx) if fx else rest
 
 
 def shear_packing(packing: Packing) -> Equilibrium:
     """An equilibrium far from sliding as a whole, F_x = 3e-3 F_y, or 0.3 mu F_y if that is less."""
-    share = min(3e-3, 0.3 * packing.law.mu) if packing.law.frictional else 0.0
-    with Engine(packing) as engine:
-        return equilibrate(engine, equilibrate(engine, Equilibrium.of(packing), 0.0), share * packing.fy)
+    return at_rest(packing, min(3e-3, 0.3 * packing.law.mu) * packing.fy * packing.law.frictional)

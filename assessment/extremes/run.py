@@ -36,22 +36,8 @@ def extremes(
     progress: Callable[[Sequence[Case]], Iterable[Case]] = lambda cases: cases,
     wanted: Sequence[Case] | None = None,
 ) -> dict[str, Any]:
-    """Try the cases and leave extremes.json, extremes.md and extremes.png in a folder.
-
-    Parameters
-    ----------
-    output : Path
-        The folder, made if need be.
-    quick : bool
-        Only the small part of the cases.
-    wanted : sequence of Case, optional
-        By default all of :func:`.cases.cases`.
-
-    Returns
-    -------
-    dict
-        What extremes.json holds: each case's name, group, status, figure, bound and what it says.
-    """
+    """Try the cases, or the quick ones alone, and leave extremes.json, extremes.md and extremes.png in a folder, which
+    is made if need be; returns what extremes.json holds."""
     root, done = MPI.COMM_WORLD.rank == 0, list[Outcome]()
     if root:
         make_folder(output, "extremes.json", "extremes.md")
@@ -77,9 +63,8 @@ def try_case(case: Case) -> Outcome:
     except Exception as error:
         if getattr(error, "one_rank", False):
             raise
-        said = str(error).strip()
-        sentence = isinstance(error, ValueError | FaultgougeError) and "\n" not in said and "Traceback" not in said
-        if sentence and case.refusal and case.refusal in said:
+        said, sentence = str(error).strip(), isinstance(error, ValueError | FaultgougeError)
+        if sentence and "\n" not in said and case.refusal and case.refusal in said:
             return about | {"status": "refused", "says": said}
         return about | {"says": reason_of(error)}
     if case.refusal:

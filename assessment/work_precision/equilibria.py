@@ -13,6 +13,7 @@ discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.windows`). Both
 from __future__ import annotations
 
 from functools import partial
+from itertools import count
 
 import numpy as np
 
@@ -75,8 +76,7 @@ def relaxation(settings: Settings) -> Study:
         forces = np.logspace(-3, -9, 4 if settings.quick else 7).tolist()
         runs += [("overdamped", force, partial(overdamped, force)) for force in forces]
         # errors of the forces as independent ones on all coordinates, through K^-1
-        softness = float(np.sqrt(np.mean(values**-2.0)))
-        reference_error = end.floor * softness
+        reference_error = end.floor * float(np.sqrt(np.mean(values**-2.0)))
         # both increments of the compensated arithmetic end at the same packing
         points, _ = timed(runs, settings, lambda packing: distance(packing, end.packing) or reference_error)
     numbers = {"packing": end.packing, "start": start, "slowest": slowest, "fastest": fastest}
@@ -85,9 +85,7 @@ def relaxation(settings: Settings) -> Study:
 
 def scan(path: Path, increment: float) -> tuple[float, int]:
     """The onset in the middle of the first increment that ends in a complex pair, and the number of equilibria."""
-    k = 1
-    while not spectrum(path(k * increment)).pairs:
-        k += 1
+    k = next(k for k in count(1) if spectrum(path(k * increment)).pairs)
     return (k - 0.5) * increment, k
 
 

@@ -44,21 +44,10 @@ def report(
     progress: Callable[[str, Sequence[Any]], Iterable[Any]] = lambda _, runs: runs,
     studies: dict[str, Callable[[Settings], Study]] = STUDIES,
 ) -> dict[str, Any]:
-    """Run the studies and leave report.md, report.json and a figure for each in a folder.
+    """Run the studies and leave report.md, report.json and a figure for each in a folder, which is made if need be.
 
-    Parameters
-    ----------
-    output : Path
-        The folder, made if need be.
-    quick : bool
-        Whether to compute fewer points, in half a minute instead of two.
-    progress : callable
-        Called with the name of a list of runs and the list; returns an iterable that shows how far it is.
-
-    Raises
-    ------
-    AssessmentError
-        After all studies, if one has failed.
+    Raises AssessmentError after all studies, if one has failed. `progress` is called with the name of a list of runs
+    and the list; it returns an iterable that shows how far it is.
     """
     make_folder(output, "report.json", "report.md")
     scene, done, failed = Scene.from_toml(SCENE), list[Study](), list[dict[str, str]]()

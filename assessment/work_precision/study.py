@@ -39,21 +39,9 @@ Study = dict[str, Any]
 
 @dataclass(frozen=True)
 class Settings:
-    """The settings of a study.
-
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the ramp, with a section [ramp].
-    ramp : tuple of Equilibrium
-        Its equilibria by increasing F_x, from 0 to beyond the onset.
-    quick : bool
-        Whether fewer points and shorter runs have to do.
-    repeats : int
-        Runs of which the median of the times is taken.
-    progress : callable
-        Wraps the list of runs of a study, to show how far it is.
-    """
+    """What all studies have: a scene with a ramp, and its equilibria by increasing F_x, from 0 to beyond the onset;
+    whether fewer points and shorter runs have to do; the number of runs of which the median of the times is taken; and
+    what wraps the list of runs of a study, to show how far it is."""
 
     scene: Scene
     ramp: tuple[Equilibrium, ...]
@@ -96,22 +84,10 @@ def timed(runs: Sequence[Run], settings: Settings, error: Callable[[Any], float]
 
 
 def study_of(section: str, points: list[Point], reference_error: float, numbers: dict[str, Any], **more: Any) -> Study:
-    """Make a study from its results and from the texts of words.toml.
+    """Make a study from its results and from a section of words.toml, whose texts use the numbers.
 
-    Parameters
-    ----------
-    section : str
-        Of words.toml: name, question, what the numbers of the points are, two sentences of advice and remarks, and the
-        x axis ("evaluations" or "parameter") of the second panel of the figure.
-    points : sequence of Point
-        By method.
-    reference_error : float
-        The reference's own error, in the unit of the errors.
-    numbers : mapping
-        Numbers that the texts use; the texts also have `orders`, `points`, and by method the point of least error,
-        `best`.
-    **more
-        orders : those that theory predicts, of `fit_order`.
+    The texts also have `points`, by method the point of least error, `best`, and what else is given: `orders`, those
+    that theory predicts, of `fit_order`. The reference's own error is in the unit of the errors.
     """
     best = {point.method: point for point in sorted(points, key=lambda each: -each.error)}
     known = {"points": points, "best": best, **numbers, **more}

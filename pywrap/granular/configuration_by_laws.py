@@ -109,8 +109,8 @@ def _linearised_contacts(
         if not touches.any():
             continue
         group = every.chosen(touches, every.who)
-        # laws belong to commands, which a user may change
-        key = (*commands.pair, commands.fixes.get(name), name)
+        # laws belong to commands, which a user may change; one line pair_coeff is one law for all types
+        key = (*commands.pair, commands.fixes.get(name), name if len(commands.pair) > 2 else None)
         if key not in laws:
             laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
         sticks, rolls = _linearise_measured(laws[key], group, found, mass)

@@ -150,32 +150,30 @@ class TwoParticleLammps:
             words = commands.fixes[name].split()
             at = next(k for k, word in enumerate(words) if word in PLANES)
             self.lammps.command(" ".join([*words[:2], "all", *words[3:at], "xplane 0 NULL", *words[at + 3 :]]))
-
-    def array(self, name: str) -> Floats:
-        """An array of the particles, as LAMMPS has it."""
-        return np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)]
+        names = ("x", "v", "omega", "f", "torque", "radius", "rmass", "type")
+        self.array = {name: np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)] for name in names}
 
     def place_at(self, state: State) -> None:
         """Put the particles into a fresh contact, at rest; its overlap to the last digit is that of `state`."""
         count, self.state = len(self.types), state
         for away in (True, False):
-            self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
-            self.array("type")[:], self.array("x")[:] = self.types, 0.0
-            self.array("x")[0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
+            self.array["radius"][:], self.array["rmass"][:] = state.radii[:count], state.masses[:count]
+            self.array["type"][:], self.array["x"][:] = self.types, 0.0
+            self.array["x"][0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
             self.force()
-        self.state = state._replace(overlap=sum(state.radii) - self.array("x")[0, X])
+        self.state = state._replace(overlap=sum(state.radii) - self.array["x"][0, X])
 
     def force(self, motion: int = CLOSING, speed: float = 0.0, across: float = 0.0, steps: int = 0) -> list[float]:
         """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R, after
         some steps of a motion: towards the other one, a rotation, as the speed of its surface, or one without slip, as
         the effective radius times its rate; or with a velocity across. None of them moves the particles."""
-        v, omega, own, (radius, _) = self.array("v"), self.array("omega"), self.state.radii[0], self.state.effective
+        v, omega, own, (radius, _) = self.array["v"], self.array["omega"], self.state.radii[0], self.state.effective
         v[:] = omega[:] = 0.0
         rolls = speed / radius if motion == ROLLING else 0.0
         v[0] = -speed if motion == CLOSING else 0.0, across + own * rolls, 0.0
         omega[0, Z] = (speed / own if motion == SLIPPING else 0.0) + rolls
         self.lammps.command(f"run {steps} post no")
-        f, torque = self.array("f")[0], self.array("torque")[0, Z]
+        f, torque = self.array["f"][0], self.array["torque"][0, Z]
         return [float(f[X]), float(abs(f[Y])), float(abs(torque) / radius)]
 
     def push(self, state: State, motion: int, speed: float, **across: float) -> float:
@@ -216,14 +214,14 @@ class TwoParticleLammps:
             raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
         if law["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
             self.push(wanted, SLIPPING, 0.0, across=slip / step)
-        arm = abs(self.array("torque")[0, Z] / self.array("f")[0, Y])
+        arm = abs(self.array["torque"][0, Z] / self.array["f"][0, Y])
         law |= {"tangential": force / slip, "lever": float(state.radii[0] - arm) / delta}
         overlap = delta
         for name, direction in (("parting", -1.0), ("closing", 1.0)):  # at constant slip, by a tenth of the overlap
-            x, before, velocity = self.array("x")[0, X], (force, overlap), -direction * 0.1 * delta / step
+            x, before, velocity = self.array["x"][0, X], (force, overlap), -direction * 0.1 * delta / step
             move = f"fix go one move linear {velocity:.17g} 0 0 units box"
             self.lammps.commands_list([move, "run 1 post no", "unfix go"])
-            force, overlap = self.force()[SLIPPING], overlap + x - self.array("x")[0, X]
+            force, overlap = self.force()[SLIPPING], overlap + x - self.array["x"][0, X]
             law[name] = float(np.log(force / before[0]) / np.log(overlap / before[1]))
         self.place_at(wanted)
         law["tangential_dashpot"] = self._dashpot(SLIPPING, bound, 0.01 * min(mu, 1.0) * delta / step)

@@ -133,8 +133,7 @@ def bring_to_rest(
         drags["faultgouge_spin"] = "viscous/sphere"
     rate, before = float(np.clip(rate, slowest, fastest)), 0.0
     way, residual, force, rounding, count = 0.0, np.inf, force_scale(start), 0.0, len(start)
-    free = start.coordinate_free.astype(np.float64)
-    on_bodies = diags_array(free) if start.constraint is None else (start.constraint != 0).T
+    on_bodies = diags_array(1.0 * start.coordinate_free) if start.constraint is None else (start.constraint != 0).T
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == STEPS_WITHOUT_GAIN:
@@ -201,8 +200,7 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
             f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
             "it, and set `timer timeout unlimited`."
         )
-    lost = count - lmp.extract_setting("nlocal")
-    if lost:
+    if lost := count - lmp.extract_setting("nlocal"):
         raise NoEquilibriumError(
             f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete it, or take walls."
         )

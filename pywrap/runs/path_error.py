@@ -114,8 +114,6 @@ def with_path_error(
     known: Known = {}
 
     def whole(window: Window) -> Window:
-        if not window.fx_onset > path.equilibria[0].fx:
-            return window
         growth = growth_near(window.frequency, with_dashpots)
         vanishes = growth if window.dissipative else squared_gap(window.eigenvalue)
         try:
@@ -124,10 +122,11 @@ def with_path_error(
             return window
         return replace(window, onset=replace(window.onset, fx=window.fx_onset + correction), path_error=error)
 
-    undamped = onset.undamped
-    if undamped is not None:
-        undamped = replace(undamped, windows=tuple(map(whole, undamped.windows)))
-    return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
+    def each(found: Onset) -> Onset:
+        beyond = path.equilibria[0].fx  # where the path begins, nothing adds to the error
+        return replace(found, windows=tuple(whole(one) if one.fx_onset > beyond else one for one in found.windows))
+
+    return replace(each(onset), undamped=onset.undamped and each(onset.undamped))
 
 
 def path_error(
@@ -158,9 +157,8 @@ def path_error(
     """
     changed, known = contact_changes(path, fx), {} if known is None else known
     ramp = np.array([*(each.fx for each in path.equilibria if each.fx < fx), fx])
-    steps = np.diff(ramp)
+    steps, few = np.diff(ramp), len(changed) < FEWEST_INCREMENTS
     halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
-    few = len(changed) < FEWEST_INCREMENTS
     other = halved if few else _thin_loads(ramp, changed)
     increment, slope = float(steps.max()), None
 
@@ -188,10 +186,9 @@ def path_error(
         return correction, increment if np.isnan(coarse) else error
     finer = 0.0 if few else shift("finer", halved)
     moved = [shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS]
-    if np.isnan([coarse, finer, *moved]).any():
-        return 0.0, increment
     part = 1.0 if weight > 0 else 2.0  # the ramp is the coarser path of the two
-    return 0.0, max(part * abs(coarse), 2 * abs(finer), 2 * float(np.ptp([0.0, *moved]))) + hidden
+    error = np.max([part * abs(coarse), 2 * abs(finer), 2 * np.ptp([0.0, *moved])]) + hidden
+    return 0.0, increment if np.isnan(error) else float(error)
 
 
 def contact_changes(path: LoadPath[Equilibrium], fx: float) -> NDArray[np.bool_]:
@@ -247,39 +244,23 @@ def growth_near(frequency: float, with_dashpots: Callable[[Packing], Packing]) -
 def nearby_root(
     function: Callable[[float], float], fx: float, rounding: float, reach: float, slope: float | None
 ) -> tuple[float, float | None]:
-    """The load nearest to fx, known to a share of its distance, at which a function changes its sign, and its slope.
+    """The load nearest to fx at which a function changes its sign, known to rounding or to a share of its distance, and
+    the slope of the function there: nan beyond the reach, and None at a jump.
 
     By the slope of the function on another path, if that is known and the load is near; else by secants or, where the
     function jumps there, by halving.
-
-    Parameters
-    ----------
-    function : callable
-        Takes a load, force.
-    fx, rounding, reach : float
-        Where to begin, how uncertain the root is from rounding, and how far it may be, force.
-    slope : float or None
-        Of the function on another path, its unit / force.
-
-    Returns
-    -------
-    tuple of float and float or None
-        The load, nan beyond the reach; and the slope, None at a jump.
     """
     at, step = cache(function), max(30 * rounding, 1e-9 * fx)
     if slope and abs(at(fx) / slope) < SLOPE_TOLERANCE * reach:
         return fx - at(fx) / slope, slope
     a, b = fx, fx + step
-    for _ in range(SECANT_STEPS):
+    for left in reversed(range(SECANT_STEPS)):
         if at(a) == at(b):
             break
         a, b = b, b - at(b) * (b - a) / (at(b) - at(a))
         if not abs(b - fx) < reach:
             break
-        if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding):
-            return b, (at(b + step) - at(b)) / step
-    else:
-        if abs(b - a) <= NOISE_IN_ROUNDINGS * rounding:
+        if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding if left else NOISE_IN_ROUNDINGS * rounding):
             return b, (at(b + step) - at(b)) / step
     # a jump: steps to either side grow until the sign changes, and the last is halved
     sign, near, far = np.sign(at(fx)), 0.0, max(NOISE_IN_ROUNDINGS * rounding, reach * 2.0**-WIDENINGS)

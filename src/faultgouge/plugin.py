@@ -6,6 +6,7 @@ every file in the folder whose name ends in ``plugin.so``.
 
 import ctypes
 import os
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 
@@ -37,8 +38,6 @@ def load_mpi_library() -> None:
 
 
 def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
+    with suppress(OSError):
+        return bool(ctypes.CDLL(library))
+    return False

@@ -1,15 +1,13 @@
 """A command works in its own process, and a second process, the guard, ends it: in one sentence, within two seconds.
 
 Python runs the handler of a signal between two Python instructions, and LAMMPS or LAPACK may run for minutes before the
-next; SciPy's `eig` does not even let another thread run. The process that the shell or mpiexec has started therefore
-forks before it imports any heavy package. The child does the work. The guard waits for the child and for signals,
-passes SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child the time `GRACE` to close files and to end other
-processes. Nothing is lost, because files of results are complete at any moment
-(:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words that the child has left in
-memory shared by both (`keeps`), and exits with 128 plus the number of the signal: 130, 143 or 129. When the guard ends,
-for any reason, the kernel kills the child. If a library (SIGSEGV, SIGABRT, or SIGKILL for lack of memory) or a limit of
-CPU time (SIGXCPU) ends the child, the guard prints a sentence as well; also if a library calls `exit`, with whatever
-code.
+next. The process that the shell or mpiexec has started therefore forks before it imports any heavy package, and the
+child does the work. The guard waits for the child and for signals, passes SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and
+gives the child the time `GRACE` to close files and to end other processes. Nothing is lost, because files of results
+are complete at any moment (:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words
+that the child has left in shared memory (`keeps`), and exits with 128 plus the number of the signal. When the guard
+ends, the kernel kills the child. If a library or a limit of CPU time ends the child, the guard prints a sentence as
+well.
 
 Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
 one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work after them. Only rank 0 prints. Commands
@@ -25,7 +23,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -48,9 +45,9 @@ OUTSIDE = {
 }
 """Ends of the work that are no fault of a library."""
 
-WORDS, LOCK, CLOSED, ENDED = slice(0, 4096), slice(4096, 8192), 8192, 8193
-"""Places in the memory that guard and work share: what an interrupt leaves, in words; the lock file of the work; and
-the bytes that are not zero once the work has closed its files after a signal, and once it has come to its end."""
+WORDS, CLOSED, ENDED = slice(0, 4096), 4096, 4097
+"""Places in the memory that guard and work share: what an interrupt leaves, in words; and the bytes that are not zero
+once the work has closed its files after a signal, and once it has come to its end."""
 
 _shared = mmap.mmap(-1, ENDED + 1)
 _signalled: list[float] = []
@@ -96,25 +93,12 @@ def interrupted() -> bool:
 
 def keeps(words: str, path: object = None) -> None:
     """Set what is said at an interrupt: what is kept (a record tells its file, too), and how to go on."""
-    _put(WORDS, words)
-
-
-def holds(lock: str | os.PathLike[str]) -> None:
-    """Set which lock file the guard removes if the work hangs in a library, and cannot do so."""
-    _put(LOCK, os.path.abspath(lock))
+    _shared[WORDS] = words.encode(errors="surrogateescape")[:4095].ljust(4096, b"\0")
 
 
 def has_ended() -> None:
     """Tell the guard that the work has come to its end: what exits without this has been ended by a library."""
     _shared[ENDED] = 1
-
-
-def _put(place: slice, text: str) -> None:
-    _shared[place] = text.encode(errors="surrogateescape")[:4095].ljust(4096, b"\0")
-
-
-def _text(place: slice) -> str:
-    return _shared[place].rstrip(b"\0").decode(errors="surrogateescape")
 
 
 def guarded(work: Callable[[], None]) -> NoReturn:
@@ -174,9 +158,6 @@ def _watch(child: int, waited: set[signal.Signals]) -> NoReturn:
         gone, _ = os.waitpid(child, os.WNOHANG)
     if not (gone or _shared[CLOSED]):
         os.kill(child, signal.SIGSTOP)  # so that it writes no more than is said to be kept
-        with suppress(OSError):  # the lock, unless another work has it
-            if any(each.exists() and each.samefile(_text(LOCK)) for each in Path(f"/proc/{child}/fd").iterdir()):
-                os.unlink(_text(LOCK))
         if sys.stderr.isatty():
             sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
     _say(SIGNALS[signal.Signals(number)])
@@ -199,5 +180,6 @@ def _end(code: int) -> NoReturn:
 
 def _say(what: str) -> None:
     if is_root():
+        words = _shared[WORDS].rstrip(b"\0").decode(errors="surrogateescape")
         with suppress(OSError):  # nobody may be there to read it
-            print(f"Error: {what}: {_text(WORDS)}.", file=sys.stderr, flush=True)
+            print(f"Error: {what}: {words}.", file=sys.stderr, flush=True)

@@ -121,7 +121,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
             onsets = [{"mu": run.mu, "onset": run.as_dict()} for run in another]
             summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
     if isinstance(found, str):
-        say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
+        say(f"{found.rstrip('.')}: no figures 2 and 5")
     else:
         draw_all(triggering_figures(found[0]), output, say)
     write_json(output / "summary.json", summary)

@@ -10,7 +10,6 @@ which passes :math:`v_0` without a jump if :math:`B + \mu_{ss} = 1`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -29,24 +28,16 @@ from ..triggering import Triggering
 Curve = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
 
-FITTED = {
-    f"$\\mu_{{ss}} = {share:g}$": Weakening(B=0.22, w=4.0, mu_ss=share, v0=0.05, v_ss=1.0) for share in (0.78, 0.74)
-}
-"""The paper's fits to measurements of Nasuno, Kudrolli, Bak and Gollub (1998) at two driving velocities, which are not
-public. With 0.74 the law is not continuous at v_0: B + mu_ss = 0.96."""
-
 
 def triggering_figures(found: Triggering) -> Figures:
-    """The paper's figures 2, 5 and 6."""
+    """The paper's figures 2 and 5."""
     weak, mu, erupting = found.weakening, found.start.packing.law.mu, found.runs["erupting"]
     runs = {name: (run["time"], run["msd"]) for name, run in found.runs.items()}
     three, speed = (runs["unperturbed"], runs["perturbed"], runs["erupting"]), np.abs(erupting["layer_velocity"])
-    own = {f"$\\mu_{{ss}} = {weak.mu_ss:g}$, $B = {weak.B:g}$, $w = {weak.w:g}$": replace(weak, v0=0.0, v_ss=1.0)}
     return {
-        "figure2": partial(friction_law_figure, own, mu, 5.5 / weak.w, "$(v - v_0)/v_{ss}$"),
+        "figure2": partial(friction_law_figure, replace(weak, v0=0.0, v_ss=1.0), mu),
         "figure5a": partial(eruption_figure, *three, runs.get("control"), found.outcome["weakens_at"]),
         "figure5b": partial(weakening_figure, speed, erupting["friction"], weak, mu),
-        "figure6": partial(friction_law_figure, FITTED, 1.0, 1.0, "$v/v_{ss}$"),
     }
 
 
@@ -90,14 +81,15 @@ def share(law: Weakening, velocity: ArrayLike) -> Floats:
 
 
 @styled
-def friction_law_figure(laws: Mapping[str, Weakening], mu_0: float, last: float, name: str) -> Figure:
-    """Laws mu(v) over the velocity in units of v_ss, up to a last one (the paper's figures 2 and 6)."""
-    figure = Figure(layout="constrained")
-    axes = figure.add_subplot(xlabel=name, ylabel=r"$\mu(v)$", xlim=(-0.1 * last, last))
-    for (label, law), style in zip(laws.items(), ("-", "--"), strict=False):
-        velocity = np.sort([-0.1 * last, law.v0, np.nextafter(law.v0, 1), *np.linspace(0, last, 400)])
-        axes.plot(velocity, mu_0 * share(law, velocity), linestyle=style, label=label)
-        axes.axhline(mu_0 * law.mu_ss, color=INK, linewidth=0.6, linestyle=":")
+def friction_law_figure(law: Weakening, mu_0: float) -> Figure:
+    """The law mu(v) over v - v_0 in units of v_ss, which is 1 (the paper's figure 2)."""
+    figure, last = Figure(layout="constrained"), 5.5 / law.w
+    axes = figure.add_subplot(xlabel="$(v - v_0)/v_{ss}$", ylabel=r"$\mu(v)$", xlim=(-0.1 * last, last))
+    velocity = np.array([-0.1 * last, 0.0, np.nextafter(0.0, 1), *np.linspace(0, last, 400)[1:]])
+    axes.plot(
+        velocity, mu_0 * share(law, velocity), label=rf"$\mu_{{ss}} = {law.mu_ss:g}$, $B = {law.B:g}$, $w = {law.w:g}$"
+    )
+    axes.axhline(mu_0 * law.mu_ss, color=INK, linewidth=0.6, linestyle=":")
     axes.legend(loc="upper right", title=rf"$\mu_0 = {mu_0:g}$")
     return figure
 

@@ -35,6 +35,7 @@ from ...pywrap import SceneError
 from ..result_rows import Row, append_row, check_table, read_keyed_rows, write_tables
 from ..study import Progress, Say
 from .sweep_plan import Sweep, points_of
+from .user_function import locate
 from .workers import compute_points, open_executor
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
@@ -153,7 +154,7 @@ def run_sweep(
                     say(f"{len(points) - len(missing)} of {len(points)} points are in {output / RESULTS_FILE} already")
                 if others := known.keys() - set(keys):
                     say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
-                with closing(compute_points(pool, sweep.located_task, missing)) as ended:
+                with closing(compute_points(pool, locate(sweep.task, sweep.folder), missing)) as ended:
                     for row in progress(ended, len(missing)):
                         append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
                         known[row["key"]] = row

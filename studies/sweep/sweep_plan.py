@@ -33,6 +33,9 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.validation import read_toml
 from .user_function import locate, user_function
 
+CHAOTIC = """settling is chaotic, so that a seed may be another packing at each value, and differences between values \
+are those of packings, too: compare many seeds, or settle at one load with packing.settle_at"""
+
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
 
@@ -66,10 +69,8 @@ class SweepPoint:
         """Digest of all keys on which settling depends; points with the same digest share the settled packing."""
         if self.scene is None:
             return self.key
-        resolved = with_contents(self.scene)
-        for section in ("ramp", "friction", "output"):
-            resolved.pop(section, None)
-        resolved["perturb"] = self.scene.inertia_factor
+        resolved = with_contents(self.scene) | {"perturb": self.scene.inertia_factor}
+        resolved |= dict.fromkeys(("ramp", "friction", "output"))
         if not resolved["packing"].get("settle_friction", False):
             resolved["law"].pop("mu")
         return digest(resolved)
@@ -142,11 +143,6 @@ class Sweep:
         if all(point.says is not None for point in sweep.points):
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
         return sweep
-
-    @property
-    def located_task(self) -> str:
-        """The task, with the path of its file from the root if it is a function of a file."""
-        return locate(self.task, self.folder) if self.code else self.task
 
     @property
     def names(self) -> list[str]:
@@ -229,14 +225,8 @@ def other_packings(sweep: Sweep) -> str | None:
     """
     packing = sweep.scene.get("packing", {})
     at, frictional = packing.get("settle_at", {}), packing.get("settle_friction", False)
-    settles = dict.fromkeys(("load.fy", "units.overburden"), "fy" not in at) | {"law.kn": "kn" not in at}
-    settles |= {"law.mu": frictional, "law.kt": frictional, "law.exponent": True}
-    # of [units], k_n follows from the others
-    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and "kn" not in at)]
-    if not keys or "file" in packing:
-        return None
-    return (
-        f"{', '.join(keys)}: settling is chaotic, so that a seed may be another packing at each value, and "
-        "differences between values are those of packings, too: compare many seeds, or settle at one load with "
-        "packing.settle_at"
-    )
+    load, stiffness = "fy" not in at, "kn" not in at  # of [units], k_n follows from all keys but the overburden
+    settles = {"load.fy": load, "units.overburden": load, "law.kn": stiffness, "law.exponent": True}
+    settles |= {"law.mu": frictional, "law.kt": frictional}
+    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and stiffness)]
+    return None if not keys or "file" in packing else f"{', '.join(keys)}: {CHAOTIC}"

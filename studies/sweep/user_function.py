@@ -23,6 +23,7 @@ import json
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.machinery import SourceFileLoader
@@ -60,10 +61,9 @@ class UserFunction(NamedTuple):
         except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
             says = f"{name} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
             raise UserFunctionError(says) from error
-        try:
+        plain = None
+        with suppress(AttributeError, TypeError, ValueError):
             plain = json.loads(json.dumps(row, default=lambda value: value.tolist()))
-        except (AttributeError, TypeError, ValueError) as error:
-            plain = error
         if not isinstance(plain, dict):
             raise UserFunctionError(f"{name} returned {row!r:.60}: return a dict of numbers, words and lists")
         return plain

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.sparse import csc_array, diags_array, eye_array, kron
+from scipy.sparse import block_diag, csc_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import SuperLU, splu
 
 from faultgouge.analysis.factors import sparse_lu
@@ -68,6 +68,13 @@ def test_order_of_a_matrix_whose_pattern_is_not_symmetric(seed):
     matrix.data[np.random.default_rng(seed).random(matrix.nnz) < 0.1] = 0.0
     matrix.eliminate_zeros()
     assert np.array_equal(np.sort(elimination_places(matrix)), np.arange(2700))
+
+
+def test_general_factors_of_a_matrix_with_a_small_pivot():
+    """Without other pivots nine digits would be lost."""
+    matrix = csc_array(block_diag([[[1e-9, 1.0], [1.0, 1.0]]] * 20))
+    right = np.random.default_rng(3).standard_normal(40)
+    assert np.linalg.norm(matrix @ general_lu(matrix).solve(right) - right) < 1e-13 * np.linalg.norm(right)
 
 
 @pytest.mark.parametrize("ordered", [False, True])

@@ -154,19 +154,23 @@ def test_dispersion_changes_no_stability_below_the_limit():
     assert growth_rate(1 + 2j) == growth_rate(1 - 2j) == pytest.approx(2 * np.sqrt((np.sqrt(5) - 1) / 2))
 
 
-def test_negative_eigenvalues_grow():
-    """Two disks one above the other, pressed together without friction, buckle."""
+@pytest.mark.parametrize(("overlap", "digits"), [(0.01, 1e-12), (2.0**-41, 1e-2)])
+def test_negative_eigenvalues_grow(overlap, digits):
+    """Two disks one above the other, pressed together without friction, buckle; also where they touch so little that
+    the eigenvalue is not far above the rounding of K."""
     law = MindlinLaw(2e5, 0.0, 0.0)
-    contacts = Contacts([0, 0], [-1, 1], [0, 0])
-    column = Packing(position=[[0, 0.49], [0, 1.47]], radius=[0.5, 0.5], contacts=contacts, law=law)
+    place, contacts = [[0, 0.5 - overlap], [0, 1.5 - 3 * overlap]], Contacts([0, 0], [-1, 1], [0, 0])
+    column = Packing(position=place, radius=[0.5, 0.5], contacts=contacts, law=law)
     result = spectrum(column)
     # f_n/r on the relative motion of two equal masses.
-    slope = -2 * law.kn * 0.02**1.5 / 0.98
-    assert result.unstable == pytest.approx(np.array([slope]), rel=1e-12)
+    slope = -2 * law.kn * (2 * overlap) ** 1.5 / (1 - 2 * overlap)
+    assert result.unstable == pytest.approx(np.array([slope]), rel=digits, abs=0)
     assert not result.is_stable
-    assert negative_eigenvalues(column) == pytest.approx(np.array([slope]), rel=1e-12)
-    assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=1e-12)
-    assert result.growth_rate(dt=1e-3) == pytest.approx(2 * abs(discrete_frequency(slope, 1e-3).imag), rel=1e-12)
+    assert negative_eigenvalues(column) == pytest.approx(np.array([slope]), rel=digits, abs=0)
+    assert result.growth_rate() == pytest.approx(2 * np.sqrt(-slope), rel=digits, abs=0)
+    assert result.growth_rate(dt=1e-3) == pytest.approx(
+        2 * abs(discrete_frequency(slope, 1e-3).imag), rel=digits, abs=0
+    )
 
 
 @pytest.mark.parametrize(("force", "negative"), [(3e-5, 0), (3e-3, 1)])

@@ -11,10 +11,9 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from reference_layer import LAYER, REFERENCE, SMALL, toml
+from reference_layer import LAYER, REFERENCE, SMALL, store, toml
 from table_rows import rows_of
 
-from faultgouge.analysis import RunFile
 from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.files.atomic_write import lock_output, write_json, write_text
 from faultgouge.analysis.files.formats import write_packing
@@ -125,10 +124,7 @@ def test_a_result_does_not_replace_what_it_is_made_of(refusal, tmp_path, command
 def stored(tmp_path, reference_packing):
     """A folder with a scene, and a run.h5 of one equilibrium."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing, {}) as file:
-        file.append(packing, floor=1e-11, evaluations=0)
-        file.complete = True
+    store(tmp_path / "run.h5", reference_packing(1.0), floor=1e-11, evaluations=0)
     return tmp_path
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 from PIL import Image, ImageSequence
-from reference_layer import toml
+from reference_layer import store, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
@@ -122,11 +122,8 @@ def test_a_page_is_one_small_file_that_asks_for_no_other(beyond, faultgouge_here
 @pytest.mark.slow
 def test_states_of_a_run_are_shown_over_time(beyond, faultgouge_here_in, tmp_path):
     """Frames that have a time, as those of a driven layer: the force may rise and fall many times between them."""
-    with RunFile(beyond / "ramp.h5") as ramp, RunFile.create(tmp_path / "driven.h5", ramp.packing()) as run:
-        for k, time in enumerate((0.0, 1.0, 2.5, 4.0)):
-            run.append(ramp.packing((0, 2, 1, 2)[k]), time=time)
-        with run.change():
-            run.complete = True
+    with RunFile(beyond / "ramp.h5") as ramp:
+        store(tmp_path / "driven.h5", *(ramp.packing(k) for k in (0, 2, 1, 2)), times=(0.0, 1.0, 2.5, 4.0))
     done = faultgouge_here_in(tmp_path, "view", "driven.h5", "--loads", "3", "-o", "page.html")
     assert done.stdout.startswith("3 packings, ")
     page = (tmp_path / "page.html").read_text()

@@ -16,7 +16,7 @@ SECTIONS = {
 }
 SCENE = LAYER.replace("kn = 2e5", "kn = 2e5\nmu = [1.0, 0.8]") + toml(SECTIONS) + UNITS
 
-FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b", "figure6")
+FIGURES = ("figure1", "figure2", "figure3", "figure4", "figure5a", "figure5b")
 
 
 def is_complete(path):

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_layer import SMALL, toml
+from reference_layer import SMALL, store, toml
 
 from faultgouge import load
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, RunFile, eigenvalues, spectrum, stiffness_matrix
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, eigenvalues, spectrum, stiffness_matrix
 from faultgouge.analysis.responses.transient import transient_gains
 
 
@@ -18,9 +18,7 @@ def spectrum_of(faultgouge_here, tmp_path):
 
     def run(packing, *more, name="run.h5"):
         if isinstance(packing, Packing):
-            with RunFile.create(tmp_path / name, packing) as file:
-                file.append(packing)
-                file.complete = True
+            store(tmp_path / name, packing)
         words = ("spectrum", name if isinstance(packing, Packing) else packing, *more)
         return faultgouge_here(*words).stdout, json.loads(faultgouge_here(*words, "--json").stdout)
 
@@ -61,9 +59,7 @@ def test_a_driven_packing_has_its_spring_in_command_and_python_alike(spectrum_of
     packing = reference_packing(1.0)
     drive = {"spring": spring, "velocity": 1e-3, "until": 1.0}
     about = {"task": "drive", "scene": json.dumps({"drive": drive})}
-    with RunFile.create(tmp_path / "drive.h5", packing, about) as file:
-        file.append(packing, time=0.0)
-        file.complete = True
+    store(tmp_path / "drive.h5", packing, about=about, time=0.0)
     _, told = spectrum_of("drive.h5")
     drawn = load(tmp_path / "drive.h5")
     assert told["spring"] == drawn.spring == drawn.configuration.spring == (0.0 if spring == "rigid" else spring)

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 from pile_decks import DECK, ROUND
+from reference_layer import store
 
 from faultgouge import load, stability
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, RunFile
+from faultgouge.analysis import Contacts, MindlinLaw, Packing
 
 LAW = MindlinLaw(2e3, 6e2, 0.5, cn=0.5, ct=0.1, coulomb=True)
 COLUMN = Packing(
@@ -20,10 +21,7 @@ COLUMN = Packing(
 @pytest.fixture
 def stored(tmp_path):
     """A run.h5 with the column."""
-    with RunFile.create(tmp_path / "run.h5", COLUMN, {"task": "ramp", "scene": "{}"}) as file:
-        file.append(COLUMN)
-        file.complete = True
-    return tmp_path / "run.h5"
+    return store(tmp_path / "run.h5", COLUMN, about={"task": "ramp", "scene": "{}"})
 
 
 def test_the_verdict_of_a_file_comes_first_and_as_json(faultgouge_here, stored):

@@ -15,8 +15,8 @@ from faultgouge.analysis import (
     stability,
     stiffness_matrix,
 )
-from faultgouge.analysis.files.contact_tables import material_of, read_contacts, read_spheres, verdict_within_digits
-from faultgouge.analysis.files.formats import write_packing
+from faultgouge.analysis.files.contact_tables import material_of, read_contacts, verdict_within_digits
+from faultgouge.analysis.files.formats import read_particles, write_packing
 from faultgouge.pywrap import from_lammps
 
 LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
@@ -26,7 +26,7 @@ LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
 def live(tmp_path_factory):
     """Spheres at rest in LAMMPS, and their dumps with LAMMPS's own six digits."""
     folder = tmp_path_factory.mktemp("tables")
-    lmp = at_rest(3, folder / "log.lammps", count=24)
+    lmp = at_rest(3, folder / "log.lammps", count=16)
     lmp.commands_string(f"""
 compute ids all property/local patom1 patom2
 compute forces all pair/local dist force p1 p2 p3
@@ -51,39 +51,30 @@ def write_tables(folder, packing):
     size = np.linalg.norm(c.tangential_force, axis=1)
     along = c.tangential_force / size[:, None]
     zero = np.zeros((len(c), 3))
-    fstat = np.column_stack(
-        [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
+    about = [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
+    fstat = np.column_stack(about)
+    pairs = list(
+        zip(first, second, c.normal_force, c.normal_force[:, None] * c.normal, c.tangential_force, whole, strict=True)
     )
+    head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n{len(c)}\nITEM: BOX BOUNDS pp pp pp\n" + 3 * "0 1\n"
+    head += f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}"
     rows = {
         # MercuryDPM: each contact from both sides, and here with the tangential force of the second
-        "mercury.fstat": ["# 0 24", "# info", "# info", *map(six, fstat)],
+        "mercury.fstat": ["# 0 16", "# info", "# info", *map(six, fstat)],
         # YADE: forces on the second
         "yade.txt": [
             "id1 id2 fnx fny fnz fsx fsy fsz",
-            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, n, t in zip(
-                first, second, c.normal_force[:, None] * c.normal, c.tangential_force, strict=True)),
+            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, _, n, t, _ in pairs),
         ],
         # LIGGGHTS: pos id force, from either side
-        "liggghts.dump": [
-            "ITEM: TIMESTEP", "0", "ITEM: NUMBER OF ENTRIES", str(len(c)), "ITEM: BOX BOUNDS pp pp pp", *3 * ["0 1"],
-            f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}",
-            *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, f in zip(first, second, whole, strict=True)),
-        ],
+        "liggghts.dump": [head, *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, *_, f in pairs)],
         "table.csv": [
             "id1,id2,fn,ftx,fty,ftz",
-            *(f"{a},{b},{six([n, *t]).replace(' ', ',')}" for a, b, n, t in zip(
-                first, second, c.normal_force, c.tangential_force, strict=True)),
+            *(f"{a} {b} {six([f, *t])}".replace(" ", ",") for a, b, f, _, t, _ in pairs),
         ],
-    }  # fmt: skip
+    }
     for name, lines in rows.items():
         (folder / name).write_text("\n".join([*lines, ""]))
-    order = np.argsort(packing.ids)
-    place = np.column_stack([packing.position, packing.radius])[order]
-    edge = packing.box[1, 1]
-    lines = [f"{len(place)} 0 0 0 0 {edge:.17g} {edge:.17g} {edge:.17g}"]
-    (folder / "mercury.data").write_text(
-        "\n".join([*lines, *(f"{six(r[:3])} 0 0 0 {six(r[3:])} {six(np.zeros(7))}" for r in place), ""])
-    )
 
 
 LOCAL = ["index", "id1", "id2", "dist", "fn", "ftx", "fty", "ftz"]
@@ -91,20 +82,14 @@ LIGGGHTS = ["x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "image", "fx", "fy
 BY_INDEX = ("mercury.fstat", "yade.txt")
 
 
-@pytest.mark.parametrize(
-    ("name", "columns"),
-    [
-        ("local.dump", LOCAL),
-        ("table.csv", None),
-        ("liggghts.dump", LIGGGHTS),
-        ("mercury.fstat", None),
-        ("yade.txt", None),
-    ],
-)
+TABLES = {"local.dump": LOCAL, "table.csv": None, "liggghts.dump": LIGGGHTS, "mercury.fstat": None, "yade.txt": None}
+
+
+@pytest.mark.parametrize(("name", "columns"), TABLES.items())
 def test_the_verdict_of_a_table_is_the_live_one(live, name, columns):
     folder, packing = live
     write_tables(folder, packing)
-    spheres = read_spheres(folder / "spheres.dump")
+    spheres = read_particles(folder / "spheres.dump")
     if name in BY_INDEX:  # codes that count from 0
         object.__setattr__(spheres, "id", spheres.id - 1)
     found = read_contacts(spheres, folder / name, material_of(LAW), columns)
@@ -138,7 +123,7 @@ def test_digits_that_do_not_tell_are_told(live):
 
     def of(gamma):
         law = material_of(LAW.replace("gamma=100,gamma_t=100", f"gamma={gamma:.17g},gamma_t=0"))
-        return read_contacts(read_spheres(folder / "spheres.dump"), folder / "table.csv", law)
+        return read_contacts(read_particles(folder / "spheres.dump"), folder / "table.csv", law)
 
     def growth(gamma):
         found = of(gamma)
@@ -163,7 +148,7 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, table, old, new, word)
     (tmp_path / "s.csv").write_text(texts["spheres"])
     (tmp_path / "c.csv").write_text(texts["contacts"])
     with pytest.raises(FaultgougeError) as raised:
-        read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(texts["material"]))
+        read_contacts(read_particles(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(texts["material"]))
     assert word in str(raised.value)
     assert "\n" not in str(raised.value)
 
@@ -173,20 +158,16 @@ def test_spheres_come_from_any_format_with_radii(live, tmp_path, suffix):
     """With their box, and the numbers of the packing to the bit."""
     _, packing = live
     write_packing(tmp_path / f"spheres{suffix}", packing)
-    found, order = read_spheres(tmp_path / f"spheres{suffix}"), np.argsort(packing.ids)
+    found, order = read_particles(tmp_path / f"spheres{suffix}"), np.argsort(packing.ids)
     np.testing.assert_array_equal(found.position, packing.position[order])
     np.testing.assert_array_equal(found.radius, packing.radius[order])
     np.testing.assert_allclose(found.mass, packing.mass[order], rtol=1e-15)
     np.testing.assert_allclose(found.box, packing.box, rtol=1e-15)
 
 
-def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path):
+@pytest.mark.parametrize("head", ["# two spheres\n# of a laboratory\nx,y,z,radius\n", "#x y z radius\n"])
+def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path, head):
     """As in the example disks.csv; the names of YADE stand in a comment themselves."""
     rows = "0,0,0,0.5\n0.99,0,0,0.5\n"
-    found = []
-    for name, head in (("plain", ""), ("told", "# two spheres\n# of a laboratory\n")):
-        (tmp_path / f"{name}.csv").write_text(f"{head}x,y,z,radius\n{rows}")
-        found.append(read_spheres(tmp_path / f"{name}.csv"))
-    assert (found[0].position == found[1].position).all()
-    (tmp_path / "yade.txt").write_text("#x y z r\n" + rows.replace(",", " "))
-    assert (read_spheres(tmp_path / "yade.txt").position == found[0].position).all()
+    (tmp_path / "told.csv").write_text(head + (rows if "," in head else rows.replace(",", " ")))
+    assert read_particles(tmp_path / "told.csv").position.tolist() == [[0, 0], [0.99, 0]]

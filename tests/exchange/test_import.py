@@ -14,15 +14,7 @@ from reference_layer import BIN
 from table_rows import rows_of
 
 from faultgouge import load
-from faultgouge.analysis import (
-    BadInputError,
-    MindlinLaw,
-    PackingFileError,
-    RunFile,
-    nearest_image,
-    spectrum,
-    stability,
-)
+from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError, RunFile, nearest_image, spectrum, stability
 from faultgouge.analysis.files.atomic_write import SEAL
 from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
 from faultgouge.analysis.files.formats.disks import mass_of_density
@@ -115,8 +107,7 @@ def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, m
     disks = {"x": [0.5, 1.6, 2.7], "y": [0.5, 0.5, 0.5], "radius": [0.5] * 3, "top": top, "mass": mass}
     (tmp_path / "packing.json").write_text(json.dumps(disks))
     found = read_disks(tmp_path / "packing.json")
-    assert found.top.tolist() == [False, False, True]
-    assert found.mass.tolist() == np.broadcast_to(mass, 3).tolist()
+    assert (found.top.tolist(), found.mass.tolist()) == ([False, False, True], np.broadcast_to(mass, 3).tolist())
 
 
 def test_the_layer_may_be_said_in_six_ways(tmp_path, sheared):

@@ -83,9 +83,9 @@ def test_types_have_names(read):
 
 def test_types_of_gsd_have_names(tmp_path):
     hoomd = pytest.importorskip("gsd.hoomd", reason="gsd comes with the extra export")
-    frame = hoomd.Frame()
-    frame.particles.N, frame.particles.position = 2, [[0, 0.5, 0], [1, 0.5, 0]]
-    frame.particles.diameter, frame.particles.typeid, frame.particles.types = [1, 1], [1, 0], ["Al", "Fe"]
+    frame, particles = hoomd.Frame(), {"N": 2, "position": [[0, 0.5, 0], [1, 0.5, 0]], "diameter": [1, 1]}
+    for name, value in (particles | {"typeid": [1, 0], "types": ["Al", "Fe"]}).items():
+        setattr(frame.particles, name, value)
     frame.configuration.box = [9, 9, 0, 0, 0, 0]
     with hoomd.open(str(tmp_path / "a.gsd"), "w") as file:
         file.append(frame)

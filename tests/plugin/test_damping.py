@@ -1,7 +1,6 @@
 """Dashpots and drag in LAMMPS: forces over velocities, Coulomb's bound, orders in the time step."""
 
 import itertools
-from ctypes import c_double
 from dataclasses import replace
 
 import numpy as np
@@ -23,25 +22,21 @@ def damped(packing, exponent=1.5, cn=1.0, ct=1.0, compensated=False, **changes):
     return replace(packing, law=law, position_low=low, **changes)
 
 
-class Moving:
-    """Forces of a packing whose disks have velocities, dashpots on."""
+def moving(engine):
+    """A function of velocities (x.., y.., R theta..): forces (Fx.., Fy.., T/R..) of the packing, dashpots on."""
+    lammps, radius = engine.lammps, engine.packing.radius
+    # the integrator adds the low parts of forces
+    lammps.command("fix move all nve/disc 1.0 ${compensated}")
+    lammps.command(f"include {DECKS}/dashpots.in")
 
-    def __init__(self, engine):
-        self.engine, self.lammps = engine, engine.lammps
-        self.radius = engine.packing.radius
-        # the integrator adds the low parts of forces
-        self.lammps.command("fix move all nve/disc 1.0 ${compensated}")
-        self.lammps.command(f"include {DECKS}/dashpots.in")
-
-    def force(self, velocity):
-        """(Fx.., Fy.., T/R..) at velocities (x.., y.., R theta..)."""
+    def force(velocity):
         vx, vy, vu = velocity.reshape(3, -1)
-        zero = np.zeros_like(vx)
-        for name, rows in (("v", (vx, vy, zero)), ("omega", (zero, zero, vu / self.radius))):
-            flat = np.column_stack(rows).ravel()
-            self.lammps.scatter_atoms(name, 1, 3, (c_double * flat.size)(*flat))
-        self.lammps.command("run 0 post no")
-        return self.engine.net_force
+        for name, rows in (("v", (vx, vy, 0 * vx)), ("omega", (0 * vx, 0 * vx, vu / radius))):
+            engine.scatter(name, np.column_stack(rows))
+        engine.command("run 0 post no")
+        return engine.net_force
+
+    return force
 
 
 @exponents
@@ -54,10 +49,10 @@ def test_matrix_is_the_derivative_of_the_forces_over_velocities(reference_packin
     matrix, step = damping_matrix(packing), 2.0**-10
     assert packing.contacts.floor.any()
     with Engine(packing) as engine:
-        run = Moving(engine)
+        force_at = moving(engine)
         # of all disks at once: a wrong entry is seen along every direction
         for velocity in np.random.default_rng(0).choice([-1.0, 1.0], (10, matrix.shape[0])):
-            force = (run.force(-step * velocity) - run.force(step * velocity)) / (2 * step)
+            force = (force_at(-step * velocity) - force_at(step * velocity)) / (2 * step)
             # the forces are linear in the velocity; they are known to the last place of a sum of order 3, over the step
             assert np.abs(force - matrix @ velocity).max() < 1e-9 * np.abs(matrix.data).max()
 
@@ -82,12 +77,12 @@ def test_two_disks_and_the_floor_in_motion(exponent, compensated, cn, ct, mu, ov
     limit = bare.law.slip_limit(bare.geometry.overlap)
     rng = np.random.default_rng(5)
     with Engine(bare) as engine:
-        run = Moving(engine)
+        force_at = moving(engine)
         for share, scale in itertools.product([-1.0, -0.5, 0.0, 0.9, 1.0, 3.0], [0.0, 1e-3, 1.0]):
             packing = replace(bare, contacts=found.slipped(share * limit))
             velocity = scale * rng.standard_normal(6)
             engine.restore(packing)
-            force = run.force(velocity).reshape(3, 2)
+            force = force_at(velocity).reshape(3, 2)
             expected = forces_of_moving_contacts(packing, ((0, 1), (0, -1)), *velocity.reshape(3, 2))
             # overlaps are known to 1e-16 of a coordinate
             known = 5e-16 / overlap if not compensated else 0.0
@@ -127,15 +122,8 @@ def test_second_order_in_the_time_step(exponent, parts):
     height = 0.5 - overlap + (1 - overlap) * np.arange(5)
     position = np.column_stack([np.full(5, 2.0), height]) + 1e-4 * np.random.default_rng(2).standard_normal((5, 2))
     law = MindlinLaw(1e4 * overlap ** (1 - exponent), 5e3 * overlap ** (1 - exponent), 50.0, exponent)
-    column = Packing(
-        position=position,
-        radius=np.full(5, 0.5),
-        law=law,
-        contacts=touching(position, np.full(5, 0.5)),
-        top=np.arange(5) == 4,
-        fx=1.0,
-        fy=float(law.normal_force(overlap)),
-    )
+    radius, load = np.full(5, 0.5), {"fx": 1.0, "fy": float(law.normal_force(overlap)), "top": np.arange(5) == 4}
+    column = Packing(position=position, radius=radius, law=law, contacts=touching(position, radius), **load)
     packing, ends = damped(column, exponent, **{"cn": 40.0, "ct": 40.0, **parts}), []
     for dt in (1e-3, 5e-4, 2.5e-4):
         with Engine(packing) as engine, engine.undamped(dt) as dynamics:

@@ -128,12 +128,11 @@ def test_work_of_the_load_is_stored_moves_or_is_dissipated(watch_script, dashpot
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_energies_go_through_a_restart(watch_script, compensated, ranks):
-    def end(middle, ranks=1):
-        settings = {"every": 500, "compensated": compensated, "column": 8 + bool(compensated)}
-        pairs, disks = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", ranks=ranks, **settings)
-        return contacts(pairs[-1], disks[-1])
-
-    straight, again = end(""), end(AGAIN + LAW, ranks)
+    settings = {"every": 500, "compensated": compensated, "column": 8 + bool(compensated)}
+    straight, again = (
+        contacts(*(frames[-1] for frames in watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", **on, **settings)))
+        for middle, on in (("", {}), (AGAIN + LAW, {"ranks": ranks}))
+    )
     assert straight.keys() == again.keys()
     assert all(np.array_equal(straight[each], again[each]) for each in straight)
     assert max(row[2] for row in straight.values()) > 0
@@ -143,17 +142,15 @@ def test_energies_go_through_a_restart(watch_script, compensated, ranks):
 @pytest.mark.parametrize(("first", "second"), [("yes", "no"), ("no", "yes")])
 def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(watch_script, first, second, compensated):
     """Energies begin at zero then, or are left out; a wall without them has no column for them."""
-    begin, end, column = f"{MODEL}run 500\n", f"{LOOK}run 0\n", 7 + bool(compensated)
-    again, settings = AGAIN + LAW.replace("${energy}", f"energy {second}"), {"every": 500, "compensated": compensated}
-    (pairs,), (disks,) = watch_script(
-        begin + again + end, energy=f"energy {first}", column=column + (second == "yes"), **settings
-    )
-    (bare_pairs,), (bare_disks,) = watch_script(begin + end, energy="", column=column, **settings)
-    assert np.array_equal(pairs, bare_pairs)
-    assert np.array_equal(disks[:, :9], bare_disks[:, :9])
-    assert not pairs[:, 4].any()
-    if second == "yes":
-        assert not disks[:, 9].any()
+    again = AGAIN + LAW.replace("${energy}", f"energy {second}")
+    seen = []
+    for middle, energy, more in ((again, f"energy {first}", second == "yes"), ("", "", False)):
+        settings = {"every": 500, "compensated": compensated, "column": 7 + bool(compensated) + more}
+        (pairs,), (disks,) = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 0\n", energy=energy, **settings)
+        seen.append((pairs, disks[:, :9]))
+        assert not pairs[:, 4].any()
+        assert not more or not disks[:, 9].any()
+    assert all(np.array_equal(one, other) for one, other in zip(*seen, strict=True))
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_layer import store
 
 from faultgouge.analysis import MindlinLaw, RunFile
 from faultgouge.pywrap import Scene, perturb, ramp, settle
@@ -140,9 +141,7 @@ def test_what_is_written_is_read_in_any_units(units, tmp_path, faultgouge_here):
     """Exports come back to the bit, and an import is in balance; draw and view take it."""
     for name, (length, force, mass) in (("own", (1.0, 1.0, 1.0)), ("other", units)):
         packing = settle(scene(length, force, mass)).packing
-        with RunFile.create(tmp_path / f"{name}.h5", packing) as file:
-            file.append(packing)
-            file.complete = True
+        store(tmp_path / f"{name}.h5", packing)
         for suffix in (".xyz", ".data"):
             faultgouge_here("export", f"{name}.h5", "-o", f"{name}{suffix}")
             done = faultgouge_here("import", f"{name}{suffix}", "-o", f"{name}{suffix}.h5").stdout

@@ -10,7 +10,7 @@ import pytest
 from reference_layer import REFERENCE, toml
 from table_rows import rows_of
 
-from faultgouge.analysis import RunFile, read_dump
+from faultgouge.analysis import RunFile, Slip, read_dump
 from faultgouge.pywrap import EngineError, Equilibrium, Record, Scene, SceneError, drive
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
@@ -18,8 +18,8 @@ from faultgouge.pywrap.runs.drive import (
     CONFIDENCE,
     NOISES,
     advance_error,
+    advance_of,
     check_drive,
-    clock_advance,
     settle_for_drive,
 )
 
@@ -35,11 +35,10 @@ THROWN = {"spring": 300.0, "velocity": 40.0, "until": 0.2, "states": 0.02}
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A scene of the reference packing with a drive."""
+    """A scene of the reference packing, of its disks alone, with a drive."""
     numbers = json.loads(REFERENCE.read_text())
     path = tmp_path_factory.mktemp("packing") / "packing.json"
-    keys = ("x", "y", "radius", "top", "box_length")
-    path.write_text(json.dumps({key: numbers[key] for key in keys}))
+    path.write_text(json.dumps({key: numbers[key] for key in ("x", "y", "radius", "top", "box_length")}))
 
     def make(precision="double", **drive):
         return Scene.from_mapping(BASE | {"packing": {"file": str(path)}, "precision": precision, "drive": drive})
@@ -53,12 +52,12 @@ def settled(scene):
     return settle_for_drive(scene(**DRAWN))
 
 
-def run_to_end(scene, path, parts=None):
-    """Run a drive, or so many parts of it."""
+def run_to_end(scene, path, parts=None, others=None):
+    """Run a drive, or so many rows of it."""
     with Record(path, scene, task="drive") as record:
         if record.last is None:
             record.append(Equilibrium.of(settle_for_drive(scene)))
-        for count, step in enumerate(record.drive()):
+        for count, step in enumerate(record.drive(others)):
             if parts is not None and count == parts:
                 return step
         record.finish()
@@ -73,29 +72,33 @@ def datasets(path):
     return found
 
 
+def assert_same(path, other):
+    here, there = datasets(path), datasets(other)
+    assert here.keys() == there.keys()
+    for name, values in here.items():
+        np.testing.assert_array_equal(values, there[name], err_msg=name)
+
+
 @pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.slow)])
 def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
     """Cut off twice, once after disks have gone round the period."""
-    wanted = scene(precision, **THROWN)
-    last = run_to_end(wanted, tmp_path / "whole.h5")
+    wanted, whole, cut = scene(precision, **THROWN), tmp_path / "whole.h5", tmp_path / "cut.h5"
+    last = run_to_end(wanted, whole)
     assert last.sample.displacement > 1.5
     for rows in (30, 25):
-        run_to_end(wanted, tmp_path / "cut.h5", rows)
-        with RunFile(tmp_path / "cut.h5") as file:
+        run_to_end(wanted, cut, rows)
+        with RunFile(cut) as file:
             assert not file.complete
             assert file.checkpoint
-    with Record(tmp_path / "cut.h5", wanted, task="drive") as record:
+    with Record(cut, wanted, task="drive") as record:
         assert list(record.drive())
-    with Record(tmp_path / "cut.h5", wanted, task="drive") as record:  # it was killed before it could finish the file
+    with Record(cut, wanted, task="drive") as record:  # it was killed before it could finish the file
         assert record.complete
-    whole, cut = datasets(tmp_path / "whole.h5"), datasets(tmp_path / "cut.h5")
-    assert whole.keys() == cut.keys()
-    for name, values in whole.items():
-        np.testing.assert_array_equal(values, cut[name], err_msg=name)
+    assert_same(whole, cut)
     with pytest.raises(SceneError, match=r"drive.velocity is 40.0 there and 41.0 here"):
-        run_to_end(scene(precision, **THROWN | {"velocity": 41.0}), tmp_path / "cut.h5")
+        run_to_end(scene(precision, **THROWN | {"velocity": 41.0}), cut)
     with pytest.raises(SceneError, match="is a file of the command drive"):
-        Record(tmp_path / "cut.h5", wanted, task="ramp")
+        Record(cut, wanted, task="ramp")
 
 
 @pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.slow)])
@@ -151,24 +154,16 @@ def test_stored_packing_keeps_its_slips(scene, tmp_path):
     np.testing.assert_array_equal(start.position, whole.position)
 
 
-def series_of(scene, path):
-    """The series of a whole run."""
-    run_to_end(scene, path)
-    with RunFile(path) as file:
-        return file.series("drive")
-
-
 @pytest.mark.parametrize("spring", [10.0, "rigid"])
 def test_run_does_not_depend_on_where_it_ends(scene, tmp_path, spring):
     """Rows and states of a shorter run are those of the longer one, but for the last row."""
-    wanted = {"spring": spring, "velocity": 2e-3}
-    short, long = (series_of(scene(**wanted, until=until), tmp_path / f"{until}.h5") for until in (6.0, 9.0))
-    for name, values in short.items():
-        np.testing.assert_array_equal(values[:-1], long[name][: len(values) - 1], err_msg=name)
-    with RunFile(tmp_path / "6.0.h5") as file, RunFile(tmp_path / "9.0.h5") as other:
-        times = file.observable("time")[:-1]
-        assert len(times) > 1
-        np.testing.assert_array_equal(times, other.observable("time")[: len(times)])
+    for until in (6.0, 9.0):
+        run_to_end(scene(spring=spring, velocity=2e-3, until=until), tmp_path / f"{until}.h5")
+    short, long = (datasets(tmp_path / f"{until}.h5") for until in (6.0, 9.0))
+    for name in (each for each in short if each.startswith(("faultgouge", "observables/time"))):
+        count = len(short[name]) - 1
+        assert count > 1
+        np.testing.assert_array_equal(short[name][:-1], long[name][:count], err_msg=name)
 
 
 SLIPS = {
@@ -239,75 +234,48 @@ def test_command_on_two_ranks_is_the_same_to_the_bit(scene, faultgouge, faultgou
         assert "slow driving takes 100" in done.stderr
     assert results[0] == results[1]
     assert results[0]["slips"] == []
-    one, two = datasets(tmp_path / "1.h5"), datasets(tmp_path / "2.h5")
-    assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one | two)
+    assert_same(tmp_path / "1.h5", tmp_path / "2.h5")
     assert (tmp_path / "1.csv").read_text().startswith("begins,ends,")
-
-
-SIGNAL = {"signal": "pulse", "at": 0.06, "omega": 200.0, "scale": 5.0}
 
 
 @pytest.mark.long
 def test_runs_that_differ_in_the_signal_share_what_is_before_it(scene, tmp_path):
     """Each goes on from a file of the run with the signal, and ends as one that has run from the beginning. Up to the
     signal all are equal to the bit."""
-    wanted = scene(**THROWN, **SIGNAL)
+    wanted = scene(**THROWN, signal="pulse", at=0.06, omega=200.0, scale=5.0)
     drives = {"without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
-    scenes = {name: wanted.model_copy(update={"drive": drive}) for name, drive in drives.items()}
-    with Record(tmp_path / "with.h5", wanted, task="drive") as record:
-        record.append(Equilibrium.of(settle_for_drive(wanted)))
-        for _ in record.drive({tmp_path / f"{name}.h5": each for name, each in scenes.items()}):
-            pass
-        record.finish()
-    series = {}
-    for name, each in scenes.items():
-        path, alone = tmp_path / f"{name}.h5", tmp_path / f"{name}_alone.h5"
+    scenes = {tmp_path / f"{name}.h5": wanted.model_copy(update={"drive": each}) for name, each in drives.items()}
+    run_to_end(wanted, tmp_path / "with.h5", others=scenes)
+    for path, each in scenes.items():
         with RunFile(path) as file:
-            reached = file.series("drive")["time"][-1]
             assert not file.complete
-        assert 0.04 < reached <= 0.06
+            assert 0.04 < file.series("drive")["time"][-1] <= 0.06
         run_to_end(each, path)
-        run_to_end(each, alone)
-        with RunFile(path) as file, RunFile(alone) as other:
+        run_to_end(each, tmp_path / "alone.h5")
+        with RunFile(path) as file, RunFile(tmp_path / "alone.h5") as other:
             assert file.attributes["scene"] == other.attributes["scene"]
-            series[name] = other.series("drive")
-        here, there = datasets(path), datasets(alone)
-        assert here.keys() == there.keys()
-        assert all(np.array_equal(here[name], there[name], equal_nan=True) for name in here)
-    with RunFile(tmp_path / "with.h5") as file:
-        series["with"] = file.series("drive")
-    moved = {name: values["displacement"] for name, values in series.items()}
-    for name in ("with", "noise"):
-        same = moved[name] == moved["without"]
-        assert same[series["with"]["time"] < 0.06].all()
+        assert_same(path, tmp_path / "alone.h5")
+        (tmp_path / "alone.h5").unlink()
+    time, *moved = (
+        datasets(tmp_path / f"{name}.h5")[f"faultgouge/drive/{column}"]
+        for name, column in (("with", "time"), *((name, "displacement") for name in ("without", "with", "noise")))
+    )
+    for each in moved[1:]:
+        same = each == moved[0]
+        assert same[time < 0.06].all()
         assert not same.all()
-    assert np.abs(moved["with"] - moved["without"]).max() > 1e-4
+    assert np.abs(moved[1] - moved[0]).max() > 1e-4
 
 
-def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
-    """Of series that are made: a small slip with the signal does not count."""
-    wanted = scene(spring=10.0, velocity=1e-3, until=200.0, signal="pulse", at=60.0, omega=2.0, scale=0.1)
-    start = settle_for_drive(wanted)
+def test_clock_advance_is_the_time_between_comparable_slips():
+    """A small slip with the signal does not count."""
 
-    def store(name, drive, slips):
-        time = np.arange(0.0, 200.0, 0.1)
-        moved = sum(size * np.clip((time - begin) / 3.0, 0.0, 1.0) for begin, size in slips)
-        with Record(tmp_path / name, wanted.model_copy(update={"drive": drive}), task="drive") as record:
-            record.append(Equilibrium.of(start))
-            file = RunFile(tmp_path / name, "a")
-            force = 10.0 * (1e-3 * time - moved)
-            columns = {"time": time, "force": force, "displacement": moved, "kinetic_energy": 0 * time}
-            file.append_series("drive", **columns)
-            file.close()
+    def slip(begins, drop):
+        return Slip(begins, begins + 3.0, 0.6, 0.6 - drop, 0.1 * drop, 0.0)
 
-    store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
-    store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
-    with Record(tmp_path / "with.h5", wanted, task="drive") as record:
-        assert record.slips == 3
-    advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
-    assert advance == pytest.approx(20.0, abs=0.2)
-    store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
-    assert clock_advance(tmp_path / "with.h5", tmp_path / "none.h5") is None
+    with_signal, without = [slip(30.0, 0.5), slip(66.0, 0.45), slip(100.0, 0.6)], [slip(30.0, 0.5), slip(120.0, 1.0)]
+    assert advance_of(with_signal, without, 60.0) == 20.0
+    assert advance_of(with_signal, without[:1], 60.0) is None
 
 
 @pytest.mark.parametrize("scale", [0.0, 1e-11])

@@ -7,7 +7,6 @@ import json
 import math
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,11 +33,8 @@ def interrupted_at(number, work):
             raise KeyboardInterrupt
         return local
 
-    def call(frame, event, argument):
-        return local if Path(frame.f_code.co_filename).name in WRITERS else None
-
     before = sys.gettrace()
-    sys.settrace(call)
+    sys.settrace(lambda frame, event, argument: local if Path(frame.f_code.co_filename).name in WRITERS else None)
     try:
         work()
     except KeyboardInterrupt:
@@ -51,34 +47,23 @@ def interrupted_at(number, work):
 @pytest.fixture(scope="module")
 def equilibria(reference_packing):
     """Three of them, of which no more is asked than that they differ."""
-    packing = reference_packing(1.0)
-    return [Equilibrium(replace(packing, fx=k / 8), 0.0, 1e-12, 1) for k in range(3)]
-
-
-def open_record(path, messages):
-    return Record(path, Scene.from_mapping(SCENE), saved=lambda says, path: messages.append(says))
-
-
-@pytest.fixture(scope="module")
-def file_with_one_equilibrium(tmp_path_factory, equilibria):
-    """The bytes of a file with the first equilibrium."""
-    path = tmp_path_factory.mktemp("begun") / "run.h5"
-    with open_record(path, []) as record:
-        record.append(equilibria[0])
-    return path.read_bytes()
+    return [Equilibrium(replace(reference_packing(1.0), fx=k / 8), 0.0, 1e-12, 1) for k in range(3)]
 
 
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
 @pytest.mark.long
-def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, file_with_one_equilibrium, equilibria, share):
+def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, equilibria, share):
+    path, scene, counts, number, interrupted = tmp_path / "run.h5", Scene.from_mapping(SCENE), set(), 0, True
+    with Record(path, scene) as record:
+        record.append(equilibria[0])
+    begun = path.read_bytes()
     monkeypatch.setattr(runfile, "SHARE_OF_SAVING", share)
-    path, counts, number, interrupted = tmp_path / "run.h5", set(), 0, True
     while interrupted:
-        path.write_bytes(file_with_one_equilibrium)
+        path.write_bytes(begun)
         messages = []
-        with open_record(path, messages) as record:
+        with Record(path, scene, saved=lambda says, path, to=messages: to.append(says)) as record:
             record.append(equilibria[1])
-            interrupted = interrupted_at(number, lambda: record.append(equilibria[2]))
+            interrupted = interrupted_at(number, lambda record=record: record.append(equilibria[2]))
         with RunFile(path) as run:
             assert f"holds {len(run)} equilibria, the last at F_x = {run.fx[-1]:g}; " in messages[-1], number
             counts.add(len(run))
@@ -98,17 +83,10 @@ FORCED = {
 
 
 def perturbed_scene(kind):
+    perturb, friction = {"fx": 1e-3, "time": 0.3, **FORCED[kind]}, {"v0": 1e-9, "v_ss": 1e-6}
     damping = {"damping": {"cn": 30.0, "ct": 20.0, "tau": 0.2}} if "damped" in kind else {}
-    return Scene.from_mapping(
-        SCENE
-        | {
-            "precision": "compensated" if "compensated" in kind else "double",
-            "perturb": {"fx": 1e-3, "time": 0.3, **FORCED[kind]},
-            "friction": {"v0": 1e-9, "v_ss": 1e-6},
-            "output": {"trajectory": True},
-            **damping,
-        }
-    )
+    more = {"precision": "compensated" if "compensated" in kind else "double", "output": {"trajectory": True}}
+    return Scene.from_mapping(SCENE | {"perturb": perturb, "friction": friction} | more | damping)
 
 
 @pytest.mark.long
@@ -135,13 +113,10 @@ def test_a_film_of_an_undamped_run_is_stored_unasked(tmp_path):
     np.testing.assert_array_equal(whole["position"][same], film["position"])
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param(each, marks=pytest.mark.long) if "cosine" in each and "damped" not in each else each
-        for each in FORCED
-    ],
-)
+LONG = "cosine", "cosine, compensated"
+
+
+@pytest.mark.parametrize("kind", [pytest.param(each, marks=[pytest.mark.long] * (each in LONG)) for each in FORCED])
 @pytest.mark.slow
 def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(undamped, "SHORTEST_PART", 300)  # in place of 10,000 steps
@@ -175,61 +150,58 @@ def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
 
 
 def test_a_ramp_goes_on_from_a_settled_packing_and_its_file_then_has_the_ramp(tmp_path):
-    mapping = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
-    ramped = Scene.from_mapping(mapping | {"ramp": {"step": 1e-3, "until": 2e-3}}, command="ramp")
-    finer = Scene.from_mapping(mapping | {"ramp": {"step": 5e-4, "until": 2e-3}}, command="ramp")
-    path = tmp_path / "run.h5"
-    with Record(path, Scene.from_mapping(mapping, command="settle")) as record:
-        record.append(settle(record.scene))
+    ramped, finer = (
+        Scene.from_mapping(SCENE | {"ramp": {"step": step, "until": 2e-3}}, command="ramp") for step in (1e-3, 5e-4)
+    )
+    path, settled = tmp_path / "run.h5", Scene.from_mapping(SCENE, command="settle")
+    with Record(path, settled) as record:
+        record.append(settle(settled))
     with Record(path, ramped) as record:
         record.append(record.last)
-    with Record(path, Scene.from_mapping(mapping, command="settle")) as record:
+    with Record(path, settled) as record:
         assert record.last is not None
     with pytest.raises(SceneError, match=r"ramp\.step is 0\.001 there and 0\.0005 here"):
         Record(path, finer)
 
 
-OTHER_CONTENTS = [
-    ("ramp", "packing.file", {}),
-    ("perturb", "packing.file", {}),
-    ("perturb", "perturb.signal", {}),
-    ("drive", "packing.file", {}),
-    ("drive", "drive.signal", {}),
-    ("ramp", "packing.top", {"top": "ids:@named"}),
-]
+SECTIONS = {
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
+    "damping": {"cn": 60.0},
+    "ramp": {"step": 1e-3, "until": 2e-3},
+    "perturb": {"fx": 1e-3, "time": 1.0, "signal": "signal"},
+    "drive": {"spring": 3.0, "velocity": 1e-3, "until": 5.0, "signal": "signal", "at": 1.0},
+}
+FILE_OF = {"packing.file": "packing.json", "packing.top": "named", "perturb.signal": "signal", "drive.signal": "signal"}
 
 
-def scene_of_files(folder, more):
-    """A scene whose files are in a folder: a packing, a signal, and a list of disks."""
-    packing = json.loads(REFERENCE.read_text())
-    (folder / "packing.json").write_text(json.dumps(packing))
-    (folder / "signal").write_text("0 0\n0.1 1e-9\n0.2 0\n")
-    (folder / "named").write_text(" ".join(str(1 + disk) for disk in packing["top"]))
-    return {
-        "packing": {"file": "packing.json", **more},
-        "law": {"kn": 2e5},
-        "load": {"fy": 3.0},
-        "damping": {"cn": 60.0},
-        "ramp": {"step": 1e-3, "until": 2e-3},
-        "perturb": {"fx": 1e-3, "time": 1.0, "signal": "signal"},
-        "drive": {"spring": 3.0, "velocity": 1e-3, "until": 5.0, "signal": "signal", "at": 1.0},
-    }
-
-
-@pytest.mark.parametrize(("task", "key", "more"), OTHER_CONTENTS)
-def test_a_run_does_not_go_on_from_files_of_another_content(equilibria, tmp_path, monkeypatch, task, key, more):
+@pytest.mark.parametrize(
+    ("task", "key"),
+    [
+        *(
+            ("ramp", "packing.file"),
+            ("ramp", "packing.top"),
+            ("perturb", "packing.file"),
+            ("perturb", "perturb.signal"),
+        ),
+        *(("drive", "packing.file"), ("drive", "drive.signal")),
+    ],
+)
+def test_a_run_does_not_go_on_from_files_of_another_content(equilibria, tmp_path, monkeypatch, task, key):
     """The name is the same, and so are all keys."""
     monkeypatch.chdir(tmp_path)
-    mapping = scene_of_files(tmp_path, more)
-    scene = Scene.from_mapping(mapping, tmp_path, command=task)
-    record = partial(Record, tmp_path / "run.h5", scene, task=task)
-    with record() as run:
+    packing, name = json.loads(REFERENCE.read_text()), FILE_OF[key]
+    (tmp_path / "packing.json").write_text(json.dumps(packing))
+    (tmp_path / "signal").write_text("0 0\n0.1 1e-9\n0.2 0\n")
+    (tmp_path / "named").write_text(" ".join(str(1 + disk) for disk in packing["top"]))
+    given = {"file": "packing.json"} | ({"top": "ids:@named"} if name == "named" else {})
+    scene = Scene.from_mapping({"packing": given, **SECTIONS}, tmp_path, command=task)
+    with Record(tmp_path / "run.h5", scene, task=task) as run:
         run.append(equilibria[0])
-    name = {"file": "packing.json", "signal": "signal", "top": "named"}[key.split(".")[1]]
     before = (tmp_path / name).read_text()
     (tmp_path / name).write_text(before + "\n")
     with pytest.raises(SceneError, match=rf"run of another scene \({key}, {name}, has another content now\): give"):
-        record()
+        Record(tmp_path / "run.h5", scene, task=task)
     (tmp_path / name).write_text(before)
-    with record() as run:
+    with Record(tmp_path / "run.h5", scene, task=task) as run:
         assert run.last.packing == equilibria[0].packing

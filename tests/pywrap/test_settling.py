@@ -92,6 +92,7 @@ def test_disk_on_top_of_another_rolls_down():
     contacts = touching(position, radius, 8.0)
     packing = Packing(position=position, radius=radius, contacts=contacts, law=law, box_length=8.0, top=top, fy=3.0)
     assert lowest(packing)[0] < 0
+    assert not minimize_energy(packing, 2)[1]
     packing, found = minimize_energy(packing, 400)
     assert found
     # it has pushed its neighbours apart on the smooth floor and lies on it

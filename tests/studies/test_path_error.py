@@ -38,26 +38,33 @@ def path_of(scene, mu=None):
         yield scene_path(engine, start, scene)
 
 
+def whole(mu, below, precision, increment):
+    """The onset of the paper's packing by equilibria so far apart, alone and with the path's error, of which the
+    search of all increments takes most of the time: it lies up to 2e-3 beyond the load below it."""
+    scene, last = scene_of(PAPER, precision, increment, 0.1), round((below + 2e-3) / increment)
+    with path_of(scene, mu) as path:
+        for k in range(1, last + 1):
+            path(k * increment)
+        found = find_onset(path, increment * np.arange(round(below / increment), last + 1))
+        return found, with_path_error(found, path)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(("mu", "below"), [(1.0, 0.020), (0.8, 0.018)])
 def test_stated_intervals_contain_the_extrapolated_onset(mu, below):
-    """The onset lies up to 2e-3 beyond the load below it: the search of all increments takes most of the time."""
-
-    def whole(precision, increment):
-        scene, last = scene_of(PAPER, precision, increment, 0.1), round((below + 2e-3) / increment)
-        with path_of(scene, mu) as path:
-            for k in range(1, last + 1):
-                path(k * increment)
-            found = find_onset(path, increment * np.arange(round(below / increment), last + 1))
-            return with_path_error(found, path)
-
-    finest = whole("compensated", 1.25e-4)
+    finest = whole(mu, below, "compensated", 1.25e-4)[1]
     assert finest.error < 1e-9
     for precision in ("double", "compensated"):
         for increment in (2e-3, 1e-3, 5e-4, 2.5e-4):
-            found = whole(precision, increment)
+            found = whole(mu, below, precision, increment)[1]
             assert abs(found.fx_c - finest.fx_c) <= found.error + finest.error, (precision, increment)
             assert found.error < 1e-7
+
+
+def test_the_correction_takes_most_of_the_path_away():
+    alone, corrected = whole(1.0, 0.020, "compensated", 2e-3)
+    finer = whole(1.0, 0.020, "compensated", 1e-3)[1]
+    assert abs(corrected.fx_c - finer.fx_c) < 0.2 * abs(alone.fx_c - finer.fx_c) < 1e-11
 
 
 SLIDES = {"packing": {"seed": 11}, "law": {"kn": 2e5, "mu": 0.2}}

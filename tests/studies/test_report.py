@@ -1,4 +1,14 @@
-"""Error against run time: the pieces that a study is made of, the report's contract, and the quick report."""
+r"""Error against run time: the pieces that a study is made of, the report's contract, and the quick report.
+
+`verlet` is a readable version in NumPy of the motion that the pair style integrates. A step moves the disks by
+:math:`\mathbf v\,\Delta t` with the velocities of the half step, advances each slip by
+
+.. math:: \Delta s = \boldsymbol\tau \cdot \Delta(\mathbf r_i - \mathbf r_j) - (\Delta u_i + \Delta u_j)
+
+and clamps it. While a contact turns by :math:`\Delta\varphi` and is compressed by :math:`\Delta\delta`, the tangent at
+the end of the step errs by :math:`\tfrac12 \Delta\varphi\, \Delta\delta` in each step, and so by the first order of
+:math:`\Delta t` in a given time; the tangent at the middle by the second order.
+"""
 
 import json
 
@@ -10,7 +20,38 @@ from faultgouge.assessment.results import AssessmentError
 from faultgouge.assessment.work_precision import run, time_steps
 from faultgouge.assessment.work_precision.equilibria import relaxation
 from faultgouge.assessment.work_precision.study import Settings
-from faultgouge.pywrap import Scene, ramp
+from faultgouge.pywrap import Engine, Scene, ramp
+
+
+def verlet(packing, steps):
+    """(x, y, u) of the disks after `TIME` from rest, shape (3, N), length; no contact may form or open."""
+    i, j, pair, dt = packing.contacts.i, packing.contacts.j, ~packing.contacts.floor, time_steps.TIME / steps
+    mass = packing.mass * np.array([[1.0], [1.0], [packing.inertia_factor]])
+    velocity = np.zeros_like(mass)
+    for _ in range(steps):
+        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
+        step = dt * velocity
+        moved, turned = step[:2, i] - step[:2, j] * pair, step[2, i] + step[2, j] * pair
+        position, angle = packing.position + step[:2].T, packing.angle + step[2] / packing.radius
+        there = packing.moved(position, angle, packing.contacts)
+        middle = packing.moved(position - 0.5 * step[:2].T, angle, packing.contacts)
+        slip = packing.contacts.slip + np.sum(middle.geometry.tangent.T * moved, axis=0) - turned
+        clamped = packing.law.clamped(there.geometry.overlap, slip)
+        packing = packing.moved(position, angle, packing.contacts.slipped(clamped))
+        velocity += 0.5 * dt / mass * packing.net_force.reshape(mass.shape)
+    return np.array([*packing.position.T, packing.scaled_angle])
+
+
+def test_lammps_integrates_the_equations_of_the_readable_version():
+    """To some roundings of a coordinate after 200 and 400 steps in which all contacts slide and two stick again."""
+    packing = time_steps.three_disks()
+    for steps in (200, 400):
+        with Engine(packing) as engine, engine.undamped(time_steps.TIME / steps) as dynamics:
+            dynamics.advance(steps)
+            end = engine.packing
+        found, expected = np.array([*end.position.T, end.scaled_angle]), verlet(packing, steps)
+        assert np.abs(found - expected).max() < 1e-14
+    assert np.abs(found - verlet(packing, 100)).max() > 1e-5
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +90,6 @@ def test_a_study_that_fails_does_not_take_along_the_others_whose_ways_lead_to_on
         errors = [point["error"] for point in study["points"] if point["method"] == method]
         assert errors[-1] < least < errors[0]
         assert errors == sorted(errors, reverse=True)
-    assert {"cpu", "cores", "load", "versions"} <= set(result["machine"])
     assert "the reason" in (tmp_path / "report.md").read_text()
     assert len(said) == 2
 
@@ -57,22 +97,19 @@ def test_a_study_that_fails_does_not_take_along_the_others_whose_ways_lead_to_on
 @pytest.mark.long
 def test_quick_report(faultgouge, tmp_path):
     faultgouge("report", "--quick", "-o", "report")
-    folder = tmp_path / "report"
-    studies = {study["name"]: study for study in json.loads((folder / "report.json").read_text())["studies"]}
+    studies = {study["name"]: study for study in json.loads((tmp_path / "report/report.json").read_text())["studies"]}
     assert list(studies) == list(run.STUDIES)
     orders = [order for study in studies.values() for order in study["orders"]]
-    assert len(orders) == 3
-    for order in orders:
-        assert order["order"] == pytest.approx(order["expected"], abs=0.05)
+    assert len(orders) == 2
+    assert all(order["order"] == pytest.approx(order["expected"], abs=0.05) for order in orders)
     best = {}
     for name, study in studies.items():
         assert study["reference_error"] > 0
         assert all(point["error"] >= 0 and point["seconds"] > 0 for point in study["points"])
+        assert (tmp_path / "report" / f"{run.stem(name)}.png").stat().st_size > 10_000
         for point in study["points"]:
             key = name, point["method"]
             best[key] = min(point["error"], best.get(key, np.inf))
-    for name in map(run.stem, studies):
-        assert (folder / f"{name}.png").stat().st_size > 10_000
     assert "F_x^c = 0.02183305641" in studies["onset"]["question"]  # that of an independent code
     assert best["onset", "root of the discriminant"] < 1e-8 < best["onset", "scan, Newton"]
     assert best["relaxation", "Newton, compensated"] < 1e-18

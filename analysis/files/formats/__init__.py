@@ -205,7 +205,7 @@ def write_packing(
     says: str = _function(WRITERS[path.suffix])(path, [(0.0, found)])
     noun = "disk" if packing.dimension == 2 else "sphere"
     what = {noun: len(packing), "contact": len(found.ends), "mode": len(modes)}
-    return "; ".join([", ".join(counted(number, each) for each, number in what.items()), *([says] if says else [])])
+    return "; ".join(each for each in (", ".join(counted(count, noun) for noun, count in what.items()), says) if each)
 
 
 def write_frames(path: Path, frames: Iterable[tuple[float, Exported]]) -> None:

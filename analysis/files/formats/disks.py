@@ -154,10 +154,9 @@ class Disks:
 
 def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
     """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
-    wanted, different = -1 if frame is None else frame, sorted(set(counts))
-    if frame is None and len(different) > 1:
-        says = f"frames with {different[0]} and {different[-1]} particles"
-        raise PackingFileError(f"{path} has {says}: choose one with --frame.")
+    wanted, few, many = -1 if frame is None else frame, min(counts, default=0), max(counts, default=0)
+    if frame is None and few < many:
+        raise PackingFileError(f"{path} has frames with {few} and {many} particles: choose one with --frame.")
     if not -len(counts) <= wanted < len(counts):
         raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
     return wanted % len(counts)
@@ -276,7 +275,7 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
     place, radius, period, source = disks.position, disks.radius, disks.box_length, disks.source
     with telling(source, "describes no possible packing", ValueError):
         for k in np.flatnonzero(place[:, 1] <= 0):
-            says = f"the centre of disk {disks.id[k]} is at y = {place[k, 1]:g}, and the floor is y = 0"
+            says = f"disk {disks.id[k]} is at y = {place[k, 1]:g}, below the floor at 0"
             raise PackingFileError(f"{source}: {says}: say with --floor at which y it is.")
         pairs = neighbour_tree(place, period).query_pairs(float(radius.max()), output_type="ndarray")
         distance = np.hypot(*nearest_image(place[pairs[:, 0]] - place[pairs[:, 1]], period).T)
@@ -299,7 +298,8 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
         raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
     ends[ids == 0] = FLOOR
-    listed = Contacts(*np.where(ends[0] == FLOOR, ends[::-1], ends), slips.slip, slips.low)
+    i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
+    listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
         return listed
     slip = dict(zip(zip(listed.i.tolist(), listed.j.tolist(), strict=True), listed.slip.tolist(), strict=True))
@@ -336,8 +336,8 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
     if says is None and disks.top is None:
-        unsaid = f"{disks.source} does not say which disks are the upper layer"
-        raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        add = f"add {key.rstrip(' =')}, {LAYER_WAYS}"
+        raise BadInputError(f"{disks.source} does not say which disks are the upper layer: {add}.")
     text = "" if says is None else str(says).strip()
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
@@ -374,7 +374,7 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
             if not re.fullmatch(r"\d+(-\d+)?", part):
                 raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            first, last = (int(each) for each in (part.split("-") * 2)[:2])
+            first, last = map(int, (part.split("-") * 2)[:2])
             within = (first <= disks.id) & (disks.id <= last)
             if within.sum() <= last - first:
                 raise ValueError(f"{disks.source} has no disk {part}")

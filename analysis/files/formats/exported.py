@@ -188,8 +188,9 @@ def read_back(
             given[key] = float(values[key])
     if rows is None:
         return {"given": given}
-    first, second, *slip = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
-    return {"given": given, "slips": Slips(first.astype(np.int64), second.astype(np.int64), *slip, complete=True)}
+    columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
+    first, second = columns[:2].astype(np.int64)
+    return {"given": given, "slips": Slips(first, second, columns[2], columns[3] if low else None, complete=True)}
 
 
 def _in_space(vectors: Floats) -> Floats:

@@ -19,7 +19,7 @@ from ..atomic_write import FORMAT, FORMAT_KEY, open_plain, replace_whole
 from .disks import Disks, choose_frame, particles_of
 from .exported import Exported, read_back
 
-OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
+OWN_COLUMNS = "angle", "radius", "mass", "top", "x_low", "y_low"
 OWN_QUANTITIES = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
 GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
@@ -40,27 +40,26 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     with hoomd.open(str(path), "r") as file:
         counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
         shown = file[choose_frame(path, counts, frame)]
-    log, particles, box = shown.log, shown.particles, shown.configuration.box
-    columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
-    columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
+    log, particles = shown.log, shown.particles
     type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
+    columns = {key.removeprefix(OWN_QUANTITIES): log[key] for key in log if key.startswith(OWN_QUANTITIES)}
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
         period, rows = values.get("box_length"), log.get(CONTACTS)
-        edges = None if period is None else np.diag([float(period), 1.0, 1.0])
+        box = None if period is None else np.diag([float(period), 1.0, 1.0])
         more = read_back(path, values, None if rows is None else rows[rows[:, 0] > 0], "x_low" in columns)
-        return particles_of(path, columns, edges, type_names=type_names, **more)
-    if particles.diameter is None or not particles.N:
+    elif particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
-    given = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
-    given |= dict(zip("xyz", particles.position.T, strict=True))
-    columns = {name: np.asarray(column, dtype=np.float64) for name, column in given.items()}
-    turn = np.asarray(particles.orientation, dtype=np.float64)
-    columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
-    x, y, z, xy, xz, yz = (float(each) for each in box)
-    edges = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
-    corner = -0.5 * edges.sum(axis=0)
-    return particles_of(path, columns, edges, type_names=type_names, origin=corner, remark=GSD_PRECISION)
+    else:
+        columns = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
+        columns |= dict(zip("xyz", particles.position.T, strict=True))
+        turn = np.asarray(particles.orientation, dtype=np.float64)
+        columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
+        x, y, z, xy, xz, yz = (float(each) for each in shown.configuration.box)
+        box = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
+        more = {"origin": -0.5 * box.sum(axis=0), "remark": GSD_PRECISION}
+    numbers = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
+    return particles_of(path, numbers, box, type_names=type_names, **more)
 
 
 def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -69,8 +68,8 @@ def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, (_, exported) in enumerate(frames):
             frame = hoomd.Frame()
-            _fill(frame, exported)
             frame.configuration.step = number
+            _fill(frame, exported)
             file.append(frame)
     return f"{GSD_PRECISION}; the logged quantities are in float64, and import takes those of a packing of disks"
 
@@ -78,30 +77,27 @@ def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
 def _fill(frame: Any, e: Exported) -> None:
     radius, mass = e.particles["radius"], e.particles["mass"]
     zeros = np.zeros((len(radius), 2))
-    angle = e.particles.get("angle", zeros[:, 0])
-    flat = "fy" in e.numbers  # a Packing: y = 0 is in the middle, so that the floor stays there
+    angle, flat = e.particles.get("angle", zeros[:, 0]), "fy" in e.numbers
     box, middle = e.box.copy(), np.zeros(3)
-    if flat:
+    if flat:  # a Packing: y = 0 is in the middle, so that the floor stays there
         box[1, 1] = 2 * (e.position[:, 1] + radius).max()
         box[0, 0] = box[0, 0] if e.periodic[0] else 2 * (np.abs(e.position[:, 0]).max() + radius.max())
     elif e.origin is not None:
         middle = e.origin + 0.5 * box.sum(axis=0)
-    flats = np.flatnonzero(np.diag(box) == 0)
-    box[flats, flats] = np.ptp(e.position, axis=0)[flats] + 2 * radius.max()
-    shares = (e.position - middle) @ np.linalg.inv(box)
-    lengths, particles = np.diag(box), frame.particles
-    tilts = [box[1, 0] / lengths[1], box[2, 0] / lengths[2], box[2, 1] / lengths[2]]
-    frame.configuration.box = [*(lengths * (1, 1, 0 if flat else 1)), *tilts]
+    none = np.flatnonzero(np.diag(box) == 0)
+    box[none, none] = np.ptp(e.position, axis=0)[none] + 2 * radius.max()
+    images = np.floor((e.position - middle) @ np.linalg.inv(box) + 0.5) * e.periodic
+    (xx, yy, zz), particles = np.diag(box), frame.particles
+    frame.configuration.box = [xx, yy, 0 if flat else zz, box[1, 0] / yy, box[2, 0] / zz, box[2, 1] / zz]
     frame.configuration.dimensions = 2 if flat else 3
     particles.N, particles.types, particles.typeid = len(radius), ["bed", "top"], e.source.top.astype(np.uint32)
-    particles.position = e.position - middle - (np.floor(shares + 0.5) * e.periodic) @ box
+    particles.position = e.position - middle - images @ box
     particles.diameter, particles.mass = 2 * radius, mass
     particles.orientation = np.column_stack([np.cos(0.5 * angle), zeros, np.sin(0.5 * angle)])
     inertia = e.particles.get("inertia", e.numbers.get("inertia_factor", 0.4) * mass * radius**2)
     particles.moment_inertia = np.column_stack([zeros if flat else np.tile(inertia, (2, 1)).T, inertia])
-    own = {"x": e.position[:, 0], "y": e.position[:, 1], "angle": angle}
-    own |= {name: e.particles[name] for name in OWN_COLUMNS if name in e.particles}
-    logged = {OWN_QUANTITIES + name: values for name, values in own.items()} if flat else {}
+    own = {"x": e.position[:, 0], "y": e.position[:, 1], "angle": angle} | e.particles
+    logged = {OWN_QUANTITIES + name: own[name] for name in ("x", "y", *OWN_COLUMNS) if flat and name in own}
     logged |= {f"particles/{name}": values for name, values in e.particles.items() if name not in (*OWN_COLUMNS, "id")}
     logged |= {f"faultgouge/{key}": np.array([value]) for key, value in ({FORMAT_KEY: FORMAT} | e.numbers).items()}
     if e.rows is not None:  # gsd has no empty arrays: a row of zeros stands for no contact

@@ -11,8 +11,9 @@ end of its line, because there may be no density that gives the mass to the last
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
-from itertools import dropwhile, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, cast
 
@@ -27,6 +28,7 @@ from .tables import columns_of, lines_of, numbers_in, strip_comments
 
 HEADER_COMMENT = "# faultgouge"
 CONTACT_COMMENT = "# contact"
+HEADER = re.compile(r"^([-+.\deE\s]+?)\s+([a-z][a-z ]*?)\s*(?:#.*)?$", re.MULTILINE)
 SPHERE_COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
 
 
@@ -39,11 +41,7 @@ def read_data(path: Path) -> Disks:
     style = lines[start].partition("#")[2].strip() or "sphere"
     if style != "sphere":
         raise PackingFileError(f"{path} is of atom style {style}, which has no radii: write it with atom_style sphere.")
-    header = {}
-    for _, words in strip_comments(lines[:start], 1):  # numbers, and their names behind them
-        names = list(dropwhile(lambda word: not word[0].isalpha(), words))
-        if 0 < len(names) < len(words):
-            header[" ".join(names)] = numbers_in(" ".join(words[: -len(names)]), path)
+    header = {names: numbers_in(numbers, path) for numbers, names in HEADER.findall("\n".join(lines[:start]))}
     rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), strip_comments(lines[start + 1 :], start + 2)))
     columns = columns_of(path, rows, SPHERE_COLUMNS, f"7 are needed: {', '.join(SPHERE_COLUMNS)}")
     if len(rows) != header["atoms"][0]:
@@ -70,16 +68,16 @@ def write_data(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     That of a Packing is read back to the bit by `read_data`; of a Configuration it has the particles alone.
     """
     [(_, e)] = frames
-    mass, volume = e.particles["mass"], sphere_volume(e.particles["radius"])
-    density = mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
-    kinds = e.particles["type"] if e.rows is None else 1 + e.particles["top"]
-    columns = [e.particles["id"], kinds, 2 * e.particles["radius"], density, *e.position.T]
+    mass, radius = e.particles["mass"], e.particles["radius"]
+    density = mass / sphere_volume(radius)  # no other double gives LAMMPS the mass to the bit where this one does not
+    kinds = 1 + e.particles["top"] if e.rows is not None else e.particles["type"]
+    columns = [e.particles["id"], kinds, 2 * radius, density, *e.position.T]
     rows = [" ".join(map(repr, row)) for row in zip(*(each.tolist() for each in columns), strict=True)]
     if e.rows is None:
-        (xx, *_), (xy, yy, _), (xz, yz, zz) = e.box.tolist()
         low = (np.zeros(3) if e.origin is None else e.origin).tolist()
-        box = _sides((a, a + size) for a, size in zip(low, (xx, yy, zz), strict=True))
-        box += [f"{xy!r} {xz!r} {yz!r} xy xz yz"] if any((xy, xz, yz)) else []
+        box = _sides((a, a + size) for a, size in zip(low, np.diag(e.box).tolist(), strict=True))
+        tilts = e.box[[1, 2, 2], [0, 0, 1]].tolist()
+        box += [f"{' '.join(map(repr, tilts))} xy xz yz"] if any(tilts) else []
         head, contacts, types = f"# {FORMAT_KEY}={FORMAT}", [], kinds.max()
         says = "LAMMPS reads places, radii, masses and types; contacts, laws and loads are not in it"
     else:
@@ -91,10 +89,8 @@ def write_data(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
         contacts.append("")
         behind = [mass, *(e.particles[name] for name in ("angle", "x_low", "y_low") if name in e.particles)]
         more = zip(*(each.tolist() for each in behind), strict=True)
-        rows = [f"{row} # {' '.join(map(repr, own))}" for row, own in zip(rows, more, strict=True)]
-        inexact = np.sum(density * volume != mass)
-        odd = f" ({inexact} masses with a last bit of their own)" if inexact else ""
-        says = f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"
+        rows = [f"{row} # {' '.join(map(repr, each))}" for row, each in zip(rows, more, strict=True)]
+        says = "LAMMPS reads places, radii, masses and types, and skips angles, slips, law and load in comments"
     lines = [head, "", f"{len(rows)} atoms", f"{types} atom types", *box, "", *contacts, "Atoms # sphere", "", *rows]
     write_text(path, "\n".join(lines) + "\n")
     return says
@@ -105,8 +101,7 @@ def box_lines(packing: Packing) -> list[str]:
     x, period, margin = packing.position[:, 0], packing.box_length, 4 * packing.radius.max()
     across = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
     # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
-    thickness = float(packing.radius.min())
-    return _sides((across, box_heights(packing), (-thickness, thickness)))
+    return _sides((across, box_heights(packing), (-packing.radius.min(), packing.radius.min())))
 
 
 def _sides(ends: Iterable[tuple[float, float]]) -> list[str]:

@@ -12,12 +12,12 @@ Law, load and inertia are not part of a dump. They are given by the caller or by
 ".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
 inertia_factor. A law from the caller takes precedence.
 
-Of a dump custom, columns are x or xu or xs, radius or diameter, and, if present, id, type, mass, theta. Several
+Of a dump custom, columns are x or xu, radius or diameter, and, if present, id, type, mass, theta. Several
 snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
 """
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from os import PathLike
@@ -34,7 +34,7 @@ from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text, telling
 from ..runfile import law_of_parameters
-from .disks import ALIASES, Disks, Slips, choose_frame, in_plane, packing_of, particles_of, standard_names
+from .disks import Disks, Slips, choose_frame, in_plane, packing_of, particles_of, standard_names
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
@@ -62,11 +62,6 @@ class DumpFrame(NamedTuple):
     bounds: Floats
     columns: tuple[str, ...]
     rows: Floats
-
-    @property
-    def named(self) -> dict[str, Floats]:
-        """The columns by their standard names."""
-        return standard_names(dict(zip(self.columns, self.rows.T, strict=True)))
 
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
@@ -105,8 +100,7 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
 
 def _snapshot(path: Path, frame: int | None) -> DumpFrame:
     """A snapshot by its number; by default the last one, if all are of as many particles."""
-    counts = list[int]()
-    kept: deque[DumpFrame] = deque(maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
+    counts, kept = list[int](), deque[DumpFrame](maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
     for shown in dump_frames(path):
         kept.append(shown)
         counts.append(len(shown.rows))
@@ -117,18 +111,13 @@ def _snapshot(path: Path, frame: int | None) -> DumpFrame:
 
 
 def _disks(path: Path, shown: DumpFrame, columns: dict[str, Floats]) -> Disks:
-    """Columns in the box of a snapshot; scaled coordinates are taken to places."""
+    """Columns in the box of a snapshot."""
     low, high = shown.bounds[:, :2].T.copy()
     xy, xz, yz = shown.bounds[:, 2] if shown.bounds.shape[1] > 2 else np.zeros(3)
     # the bounds are those of a box around the tilted one
     low -= [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]
     high -= [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
-    box = np.diag(high - low)
-    box[1, 0], box[2, :2] = xy, (xz, yz)
-    shares = {axis: columns[name] for axis in "xyz" for name in (f"{axis}su", f"{axis}s") if name in columns}
-    if {"x", "y"} <= shares.keys() - columns.keys():
-        share = np.column_stack([shares.get(axis, np.zeros(len(shown.rows))) for axis in "xyz"])
-        columns |= dict(zip("xyz", (low + share @ box).T, strict=True))
+    box = np.array([[high[0] - low[0], 0, 0], [xy, high[1] - low[1], 0], [xz, yz, high[2] - low[2]]])
     sides = [each.startswith("p") for each in shown.boundary] if len(shown.boundary) == 3 else None
     return particles_of(f"{path} (step {shown.step})", columns, box, origin=low, periodic=sides)
 
@@ -136,7 +125,7 @@ def _disks(path: Path, shown: DumpFrame, columns: dict[str, Floats]) -> Disks:
 def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
     """A snapshot of `dump custom`; the last one by default, if all are of the same particles."""
     shown = _snapshot(path, frame)
-    return _disks(path, shown, shown.named)
+    return _disks(path, shown, _columns(path, shown))
 
 
 def read_dump(disks: str | PathLike[str], *, frame: int = -1, law: MindlinLaw | None = None) -> Packing:
@@ -176,34 +165,35 @@ def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None 
     pairs = next((each for each in dump_frames(beside) if each.step == shown.step), None)
     if pairs is None:
         raise PackingFileError(f"{beside} has no snapshot of step {shown.step}.")
-    disk = _columns(path, shown, law, "id", "type", "x", "y", "radius", "mass", "angle", "floor_slip")
-    pair = _columns(beside, pairs, law, "id1", "id2", "slip")
+    slips = () if law.frictional else ("angle", "floor_slip", "slip")
+    disk = _columns(path, shown, "id", "type", "x", "y", "radius", "mass", "angle", "floor_slip", absent=slips)
+    pair = _columns(beside, pairs, "id1", "id2", "slip", absent=slips)
     disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
     if "x_low" in disk:
         place, low = exact_sum(*(np.column_stack([disk[f"{axis}{part}"] for axis in "xy"]) for part in ("", "_low")))
         disk |= dict(zip(("x", "y", "x_low", "y_low"), (*place.T, *low.T), strict=True))
     found = _disks(path, shown, disk | {"top": disk["type"] == TOP_TYPE})
     ids, radius, position = found.id, found.radius, found.position[:, :2]
-    i, j = (np.minimum(np.searchsorted(ids, pair[each]), len(ids) - 1) for each in ("id1", "id2"))
-    if np.any(ids[i] != pair["id1"]) or np.any(ids[j] != pair["id2"]):
+    listed = np.array([pair["id1"], pair["id2"]])
+    i, j = np.minimum(np.searchsorted(ids, listed), len(ids) - 1)
+    if np.any(ids[[i, j]] != listed):
         raise PackingFileError(f"{beside} has a contact of a disk that {path} does not have.")
     # LAMMPS lists pairs up to its cutoff
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]
     first, second = np.append(ids[i[touch]], ids[floor]), np.append(ids[j[touch]], 0 * ids[floor])
-    parts = {"slip": "slip", "low": "slip_low"}.items()
-    slips = {part: np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for part, name in parts if name in pair}
-    return replace(found, given=given, slips=Slips(first, second, **slips, complete=True))
+    parts = {part: name for part, name in (("slip", "slip"), ("low", "slip_low")) if name in pair}
+    slip = {part: np.append(pair[name][touch], disk[f"floor_{name}"][floor]) for part, name in parts.items()}
+    return replace(found, given=given, slips=Slips(first, second, **slip, complete=True))
 
 
-def _columns(path: Path, frame: DumpFrame, law: MindlinLaw, *needed: str) -> dict[str, Floats]:
-    """Columns by standard names; without friction zeros for those of slips and angles that are absent."""
-    zeros = () if law.frictional else ("angle", "floor_slip", "slip")
-    columns = {name: np.zeros(len(frame.rows)) for name in zeros if name in needed} | frame.named
-    for name in (each for each in needed if each not in columns):
-        names = [name, *(other for other, standard in ALIASES.items() if standard == name)]
-        raise PackingFileError(f"{path} has no column {' or '.join(names)}.")
-    return columns
+def _columns(path: Path, frame: DumpFrame, *needed: str, absent: Sequence[str] = ()) -> dict[str, Floats]:
+    """Columns by standard names; zeros for those that may be absent."""
+    columns = dict(zip(frame.columns, frame.rows.T, strict=True))
+    found = {name: np.zeros(len(frame.rows)) for name in needed if name in absent} | standard_names(columns)
+    for name in (each for each in needed if each not in found):
+        raise PackingFileError(f"{path} has no column {name} (its columns: {', '.join(frame.columns)}).")
+    return found
 
 
 def _numbers_in(path: Path) -> dict[str, float]:

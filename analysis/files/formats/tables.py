@@ -23,6 +23,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,9 +42,6 @@ NUMBER_WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 
 HEADS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
 """Names of columns with blanks between them, each with its unit in brackets, if there is one."""
-
-HEAD = re.compile(r'\s*"?([^\[("]*?)"?\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?"?\s*')
-"""A name, and a unit behind it in brackets."""
 
 DECIMAL_COMMA = re.compile(r"^(\s*[-+]?\d*),(\d*(?:[eE][-+]?\d+)?\s*)$")
 
@@ -70,13 +68,11 @@ def lines_of(path: Path) -> list[str]:
 
 def number_of(word: str, where: object) -> float:
     """A word as a finite number."""
-    try:
-        value = float(word)
-    except ValueError:
-        value = NUMBER_WORDS.get(word.strip().lower(), math.nan)
-    if not math.isfinite(value):
-        raise PackingFileError(f"{where}: {word.strip()!r} is no number.")
-    return value
+    with suppress(ValueError):
+        value = NUMBER_WORDS.get(word.strip().lower())
+        if math.isfinite(value := float(word) if value is None else value):
+            return value
+    raise PackingFileError(f"{where}: {word.strip()!r} is no number.")
 
 
 def numbers_in(text: str, where: object) -> list[float]:
@@ -117,8 +113,7 @@ def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -
 
     A frame begins with its number of particles; they follow after `head` lines. `frame` is as of `choose_frame`.
     """
-    end = max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
-    counts, at = dict[int, int](), 0
+    counts, at, end = dict[int, int](), 0, len("\n".join(lines).rstrip().split("\n"))
     while at < end:
         counts[at] = int(lines[at].split()[0])
         at += head + counts[at]
@@ -142,33 +137,27 @@ def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
     Comments (lines that begin with # or //) may stand anywhere. If numbers follow the first of them at once, the last
     comment before them has the names.
     """
-    rows = [(number, line) for number, line in enumerate(lines_of(path), 1) if line.strip()]
-    body = [row for row in rows if not row[1].lstrip().startswith(("#", "//"))]
+    rows = [(number, line.strip()) for number, line in enumerate(lines_of(path), 1) if line.strip()]
+    body = [row for row in rows if not row[1].startswith(("#", "//"))]
     first = rows.index(body[0]) if body else 0
-    if first and re.match(r"\s*[-+.,\d]", body[0][1]):
-        head = rows[first - 1][1]
-    else:
-        head, body = (body[0][1], body[1:]) if body else ("", [])
+    named = first and re.match(r"[-+.,\d]", body[0][1])  # in a comment before the numbers
+    head, body = (rows[first - 1][1].lstrip("#/"), body) if named else ("".join(row[1] for row in body[:1]), body[1:])
     if not body:
         raise PackingFileError(f"{path} is no table: give a line of names, as x,y,radius, and lines of numbers.")
-    head = head.strip().lstrip("#/").strip()
     mark = next((each for each in ";,\t" if each in head), None)
     words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in body]
     if mark != ",":
         words = [(number, [DECIMAL_COMMA.sub(r"\1.\2", word) for word in each]) for number, each in words]
-    names, units = list[str](), dict[str, str]()
-    for each in head.split(mark) if mark else HEADS.findall(head):
-        match = HEAD.fullmatch(each)
-        names.append((match[1] if match else each).strip().lower())
-        if match and match["unit"] not in (None, "", "-", "1"):
-            units[ALIASES.get(names[-1], names[-1])] = match["unit"]
+    heads = [re.split(r"[\[(]", each) for each in (head.split(mark) if mark else HEADS.findall(head))]
+    names = [name.strip(' "').lower() for name, *_ in heads]
+    units = {ALIASES.get(name, name): unit.strip(' ])"') for name, (_, *has) in zip(names, heads, strict=True)
+             for unit in has if unit.strip(' ])"') not in ("", "-", "1")}  # fmt: skip
     columns = standard_names(columns_of(path, words, names, f"the first {len(names)}", more=False))
     known, lacking = ([name for name in LENGTHS if name in columns and (name in units) is has] for has in (True, False))
     if lacking and (known or length):
         where = f"{known[0]} is in {units[known[0]]}" if known else f"the disks are in {length}"
         raise PackingFileError(f"{path}: {where}, and {lacking[0]} has no unit: give every length one, or none.")
-    unit = length or (units[known[0]] if known else "")
-    mass = units.get("mass", "g" if "density" in units else "")
+    unit, mass = length or (units[known[0]] if known else ""), units.get("mass", "g" if "density" in units else "")
     if "density" in units and not unit:
         raise PackingFileError(f"{path}: density is in {units['density']}, and lengths have no unit: give one.")
     into = dict.fromkeys(known, unit) | {"angle": "radian", "mass": mass, "density": f"{mass}/({unit})**3"}
@@ -227,8 +216,8 @@ def contact_columns(
         columns = dict(zip(names, columns.values(), strict=True))
     columns = standard_names(columns)
     for name in (each for each in needed if each not in columns):
-        has = f"its columns: {', '.join(columns)}; --columns names those of a dump local"
-        raise PackingFileError(f"{path} has no column {name} ({has}).")
+        has = ", ".join(columns)
+        raise PackingFileError(f"{path} has no column {name} (its columns: {has}; --columns names those of a dump).")
     return columns
 
 
@@ -240,10 +229,9 @@ def read_slips(path: Path, length: str = "") -> Slips:
 
 def write_contacts(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     """Write a row for each contact, with all digits, and return the contents in words."""
-    [(_, exported)] = frames
-    columns = exported.source.configuration.contact_columns()
-    if "contact_slip" in exported.contacts:
-        columns["slip"] = exported.contacts["contact_slip"]
+    [(_, e)] = frames
+    columns = e.source.configuration.contact_columns()
+    columns |= {"slip": e.contacts["contact_slip"]} if "contact_slip" in e.contacts else {}
     rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
     write_text(path, "\n".join([",".join(columns), *map(",".join, rows)]) + "\n", HEAD_OF_CONTACTS)
     return "forces, overlaps and mobilised friction; `faultgouge import --contacts` takes the slips"
@@ -256,8 +244,8 @@ def read_json(path: Path) -> Disks:
     disk, or of all) and box_length (period along x). Other keys are ignored.
     """
     data = json.loads("\n".join(lines_of(path)))
-    numbers = np.array([data["x"], data["y"], data["radius"]], dtype=np.float64)
-    columns, disks = dict(zip(("x", "y", "radius"), numbers, strict=True)), len(data["x"])
+    x, y, radius = np.array([data[name] for name in ("x", "y", "radius")], dtype=np.float64)
+    columns, disks = {"x": x, "y": y, "radius": radius}, len(x)
     if data.get("mass") is not None:
         columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), disks)
     top, period = np.asarray(data.get("top", [])), data.get("box_length")
@@ -267,16 +255,14 @@ def read_json(path: Path) -> Disks:
         top = np.isin(np.arange(disks), top)
     if top.any():
         columns["top"] = top.astype(np.float64)
-    none = np.zeros(0, dtype=np.int64)
-    box = None if period is None else np.diag([float(period), 1.0, 1.0])
+    box, none = None if period is None else np.diag([float(period), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
     return particles_of(path, columns, box, slips=Slips(none, none, np.zeros(0)))
 
 
 def read_yade(path: Path) -> Disks:
     """Spheres of a text file of YADE, which counts from 0; the sides are open."""
     head, *lines = lines_of(path)
-    names = head.split()[-1].split("_")
-    names = names[: names.index("attrs")] if "attrs" in names else names  # of any number, at the end
+    names = head.split()[-1].partition("_attrs")[0].split("_")  # attributes are of any number, at the end
     if not {"x", "y", "z", "r"} <= set(names):
         raise PackingFileError(f"{path}, line 1: {head!r} names no columns x, y, z and r: export x_y_z_r from YADE.")
     rows = list(strip_comments(lines, 2))

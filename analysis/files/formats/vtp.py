@@ -60,18 +60,17 @@ def _page(e: Exported) -> Element:
     for name, values in e.contacts.items():
         _array(cells, name, np.concatenate([np.full((n, *values.shape[1:]), np.nan), values]))
     _array(places, "Points", np.concatenate([e.position, e.ends.reshape(-1, 3)]))
-    for name, these, size in (("Verts", np.arange(n), 1), ("Lines", n + np.arange(2 * count), 2)):
+    for name, size, these in (("Verts", 1, np.arange(n)), ("Lines", 2, n + np.arange(2 * count))):
         part = ElementTree.SubElement(piece, name)
-        _array(part, "connectivity", these.astype(np.int64))
-        _array(part, "offsets", size * np.arange(1, len(these) // size + 1, dtype=np.int64))
+        _array(part, "connectivity", these)
+        _array(part, "offsets", size * np.arange(1, len(these) // size + 1))
     return root
 
 
 def _array(parent: Element, name: str, values: NDArray, **more: str) -> None:
     """An array in one base64 text of its size and its content."""
-    whole = values.dtype.kind == "i"
-    about = {"type": "Int64" if whole else "Float64", "Name": name, "format": "binary"} | more
-    about |= {"NumberOfComponents": str(values.shape[1])} if values.ndim > 1 else {}
-    content = np.ascontiguousarray(values, dtype="<i8" if whole else "<f8").tobytes()
+    kind, stored = ("Int64", "<i8") if values.dtype.kind == "i" else ("Float64", "<f8")
+    more |= {"NumberOfComponents": str(values.shape[1])} if values.ndim > 1 else {}
+    content = np.ascontiguousarray(values, dtype=stored).tobytes()
     text = base64.b64encode(np.array([len(content)], dtype="<u8").tobytes() + content).decode()
-    ElementTree.SubElement(parent, "DataArray", about).text = text
+    ElementTree.SubElement(parent, "DataArray", {"type": kind, "Name": name, "format": "binary"} | more).text = text

@@ -29,8 +29,7 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
     words = values.get("Properties", "").lower().split(":")
     if len(words) < 3:
-        where = f"{path}, line {begin + 2}"
-        raise PackingFileError(f"{where}: it has no Properties=..., so that this is no extended XYZ file.")
+        raise PackingFileError(f"{path}, line {begin + 2}: it has no Properties=..., as extended XYZ has.")
     # components of a vector other than the position are numbered; a column of text has no name
     names, place = list[str | None](), None
     for name, kind, size in zip(words[::3], words[1::3], words[2::3], strict=False):
@@ -40,13 +39,12 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
         names += [None] * width if kind == "s" else [name] if width == 1 else parts[:width]
     rows = [(number + 1, lines[number].split()) for number in range(begin + 2, begin + 2 + count)]
     columns = columns_of(path, rows, names, f"Properties {len(names)}", more=False)
-    species = [] if place is None else [row[place] for _, row in rows]
     lattice, listed = numbers_in(values.get("Lattice", ""), path), values.get("contacts")
-    box = np.reshape(lattice, (3, 3)) if len(lattice) == 9 else None
-    origin = numbers_in(values.get("Origin", "0 0 0"), path)
-    sides = [each in ("T", "1", "True") for each in values.get("pbc", "T T T").split()]
     more = read_back(path, values, None if listed is None else numbers_in(listed, path), "x_low" in columns)
-    return particles_of(path, columns, box, type_names=species, origin=np.array(origin), periodic=sides, **more)
+    more["origin"] = np.array(numbers_in(values.get("Origin", "0 0 0"), path))
+    more["periodic"] = [each in ("T", "1", "True") for each in values.get("pbc", "T T T").split()]
+    more["type_names"] = [] if place is None else [row[place] for _, row in rows]
+    return particles_of(path, columns, np.reshape(lattice, (3, 3)) if len(lattice) == 9 else None, **more)
 
 
 def write_xyz(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
@@ -68,14 +66,9 @@ def _text(frame: Exported) -> str:
         properties.append(f"{'forces' if name == 'net_force' else name}:{kind}:{size}")
         words += [list(map(repr, part)) for part in values.reshape(len(values), size).T.tolist()]
     lists = {"Lattice": frame.box, "Origin": frame.origin, "contacts": frame.rows}
-    text = {
-        name: f'{name}="{" ".join(map(repr, each.ravel().tolist()))}"'
-        for name, each in lists.items()
-        if each is not None
-    }
-    periodic = " ".join("T" if each else "F" for each in frame.periodic)
-    says = [*(text[name] for name in ("Lattice", "Origin") if name in text), f'pbc="{periodic}"']
-    says += [f"Properties={':'.join(properties)}", f"{FORMAT_KEY}={FORMAT}"]
-    says += [f"{key}={float(value)!r}" for key, value in frame.numbers.items()]
-    says += [text["contacts"]] if "contacts" in text else []
+    text = {name: " ".join(map(repr, each.ravel().tolist())) for name, each in lists.items() if each is not None}
+    says = [f'{name}="{text[name]}"' for name in ("Lattice", "Origin") if name in text]
+    says += [f'pbc="{" ".join("T" if each else "F" for each in frame.periodic)}"', f"Properties={':'.join(properties)}"]
+    says += [f"{key}={value!r}" for key, value in {FORMAT_KEY: FORMAT, **frame.numbers}.items()]
+    says += [f'contacts="{text["contacts"]}"'] if "contacts" in text else []
     return "\n".join([str(len(frame.position)), " ".join(says), *map(" ".join, zip(*words, strict=True)), ""])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -61,6 +62,7 @@ def stability(
     rise: Annotated[Literal["fx"] | None, Option(help=OF_RISE)] = None,
     followed: Annotated[float | None, Option("--time", metavar="T", help="How long motion is followed.")] = None,
     follow: Follow = False,
+    relax: Annotated[bool, Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,
     output: Annotated[Path, Option("-o", "--output", hidden=True)] = Path("stability"),
     quick: Annotated[bool, Option("--quick", hidden=True)] = False,
@@ -71,7 +73,6 @@ def stability(
     state is looked at. Without a file this is the old name of `faultgouge extremes`.
     """
     from faultgouge.door import is_deck
-    from faultgouge.pywrap.granular.run_deck import run_deck
 
     if file is None:
         say("faultgouge stability without a file is called faultgouge extremes now")
@@ -87,11 +88,15 @@ def stability(
         if is_root():
             found.append(verdict_of(packing, rise, followed, follow=going_on))
 
+    if relax and not is_deck(file):
+        raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
     if not is_deck(file):
         judge(follow, stored_packing(refuse_scene(file), frame))
     else:
+        from faultgouge.pywrap.granular.run_deck import run_deck
+
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
-            packing = run_deck(file, show=show, use=judge if follow else None)
+            packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:
             judge(False, packing)
     for verdict in found:
@@ -245,9 +250,8 @@ def vibrations(
     from faultgouge.analysis import vibrations as vibrations_of
     from faultgouge.analysis.files.atomic_write import write_json, write_text
     from faultgouge.analysis.files.formats import write_packing
-    from faultgouge.figures import save
     from faultgouge.figures.series import draw_vibrations, draw_waves
-    from faultgouge.figures.style import report_failure
+    from faultgouge.studies.study import draw_all
 
     packing = _any_packing(file, frame, material)
     with working(f"{file}: vibrations"):
@@ -275,25 +279,21 @@ def vibrations(
                 write_text(output / f"{name}.csv", "\n".join([head, *lines, ""]), head)
         for suffix in (".xyz", ".vtp"):
             write_packing(output / f"softness{suffix}", packing, values={"softness": soft})
-        with report_failure("density", say):
-            save(draw_vibrations(found), output / "density")
-        if plane:
-            with report_failure("waves", say):
-                save(draw_waves(plane, moduli), output / "waves")
+    pictures = {"density": partial(draw_vibrations, found)}
+    draw_all(pictures | ({"waves": partial(draw_waves, plane, moduli)} if plane else {}), output, say)
     few = "all modes" if found.modes is not None else f"window {found.resolution[0] / found.largest:.2g} of the largest"
-    yield (
-        f"{found.counted} motions with a frequency up to {found.largest / 1.01:.6g} ({few}), {found.zero} without "
-        f"stiffness, {found.negative} with a negative eigenvalue; written to {output}"
-    )
+    motions = f"{found.counted} motions with a frequency up to {found.largest / 1.01:.6g} ({few}), {found.zero} without"
+    yield f"{motions} stiffness, {found.negative} with a negative eigenvalue; written to {output}"
     if moduli is not None:
         yield repr(moduli).strip("<>")
 
 
 def _any_packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
-    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_spheres
+    from faultgouge.analysis.files.contact_tables import material_of, of_material
+    from faultgouge.analysis.files.formats import read_particles
     from faultgouge.door import load
 
     if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
         raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
-    return load(file, frame) if material is None else of_material(read_spheres(file, frame), material_of(material))
+    return load(file, frame) if material is None else of_material(read_particles(file, frame), material_of(material))

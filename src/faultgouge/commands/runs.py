@@ -120,10 +120,8 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     with RunFile(output) as file:
         columns = {name: file.observable(name).tolist() for name in ("fx", "residual", "floor", "evaluations")}
         numbers, turns = range(len(file)), len(scene.ramp.turning_points) > 1
-        columns |= {
-            "contacts": [len(file.packing(k).contacts) for k in numbers],
-            "way": [*map(fallbacks(file).get, numbers)],
-        }
+        columns["contacts"] = [len(file.packing(k).contacts) for k in numbers]
+        columns["way"] = [*map(fallbacks(file).get, numbers)]
         left = hysteresis([file.packing(k) for k in numbers]) if turns else None
     fx = columns["fx"][-1]
     if fx == loads[-1]:
@@ -312,14 +310,12 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
         noise, advance = [clock_advance(path, without) for path in noisy], clock_advance(output, without)
         error = advance_error(noise, float(series["time"][1] - series["time"][0]))
         result |= {"clock_advance": advance, "clock_advance_error": error, "clock_advances_of_noise": noise}
-        side = "earlier" if (advance or 0.0) >= 0 else "later"
-        within = "; with noise none follows in the run"
-        if advance is not None and error is not None:
-            alone = ", which noise alone may do" if abs(advance) <= error else ""
-            within = f", \u00b1 {error:.2g} (95 %, of {len(noise)} runs with noise of 1e-12){alone}"
-        yield (
-            "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
-            if advance is None
-            else f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal{within}"
-        )
+        said = "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+        if advance is not None:
+            side = "earlier" if advance >= 0 else "later"
+            said = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+            within = f", \u00b1 {error or 0.0:.2g} (95 %, of {len(noise)} runs with noise of 1e-12)"
+            said += "; with noise none follows in the run" if error is None else within
+            said += ", which noise alone may do" if error is not None and abs(advance) <= error else ""
+        yield said
     yield result

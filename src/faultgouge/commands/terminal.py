@@ -18,13 +18,13 @@ from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
 
 import typer
 from typer import Argument, Option
 from typer.models import CommandInfo
 
-from ..signal_guard import holds, is_root, keeps
+from ..signal_guard import is_root, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -83,27 +83,15 @@ def command(
 ) -> Callable[[Callable[P, Results]], Callable[P, Results]]:
     """Make a function a command: its scene is read, its output is kept from others, and what it yields is printed.
 
-    An error that the function raises is printed in one sentence by :mod:`faultgouge.cli`; `say`, `status`, `working`
-    and `progress` show how far the work is.
-
-    Parameters
-    ----------
-    example : str
-        Of the help.
-    reads : str, optional
-        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
-    writes : {"", "file", "new", "run", "folder"}
-        What the option `output` is, see `locked`.
-    kept : str
-        What an interrupt leaves of the output, in words that name it as {output}.
-    alone : bool
-        Whether rank 0 alone works.
-    as_json : bool
-        Whether the command has the option --json. Lines that follow the document then go to standard error.
+    An error that the function raises is printed in one sentence by :mod:`faultgouge.cli`. The argument `scene`, of type
+    `SceneFile`, is read as the command `reads` reads it, before anything is written. The option `output` is what
+    `locked` calls `writes`, and `kept` says what an interrupt leaves of it, in words that name it as {output}. With
+    `alone` rank 0 alone works. With `as_json` the command has the option --json, and lines that follow the document go
+    to standard error.
     """
 
     def register(work: Callable[P, Results]) -> Callable[P, Results]:
-        own = inspect.signature(work)
+        own = inspect.signature(work, eval_str=True)
 
         @wraps(work)
         def run(as_json: bool = False, **given: Any) -> None:
@@ -127,11 +115,8 @@ def command(
                         print_line(json.dumps({FORMAT_KEY: FORMAT, **result}, indent=1))
                         speak = say
 
-        hints = get_type_hints(work, include_extras=True)
-        parameters = [each.replace(annotation=hints[key]) for key, each in own.parameters.items()]
-        if as_json:
-            flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
-            parameters.append(flag)
+        flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
+        parameters = [*own.parameters.values(), *([flag] if as_json else [])]
         vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
         run.__annotations__ = {each.name: each.annotation for each in parameters}
         called, help_ = work.__name__.rstrip("_"), inspect.getdoc(work) or ""
@@ -160,7 +145,7 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
     Of the kind "new" it is not there yet; a "run" takes its lock itself; a "folder" is made. A table of the program
     begins with `head`.
     """
-    from faultgouge.analysis.files.atomic_write import check_output, lock_of, lock_output, make_folder
+    from faultgouge.analysis.files.atomic_write import check_output, lock_output, make_folder
 
     if kind == "new" and output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -171,8 +156,6 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
         return
     if kind == "folder":
         make_folder(output)
-    if lock := lock_of(output):
-        holds(lock)  # the guard removes the lock of a work that cannot do so itself
     with nullcontext() if kind == "run" else lock_output(output):
         yield
 
@@ -183,16 +166,14 @@ def stored_packing(file: Path, frame: int = -1, time: float | None = None) -> Pa
     from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.door import load, packing_in
 
-    if file.suffix == ".disks" or holds_configuration(file):
-        if time is None:
-            return load(file, frame)
-    else:
-        with RunFile(file) as run:
-            if time is None:
-                return packing_in(run, frame)
-            if run.attributes.get("task") == "drive":
-                return packing_in(run, int(abs(run.observable("time") - time).argmin()))
-    raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
+    if time is None and (file.suffix == ".disks" or holds_configuration(file)):
+        return load(file, frame)
+    with RunFile(file) as run:
+        if time is not None:
+            if run.attributes.get("task") != "drive":
+                raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
+            frame = int(abs(run.observable("time") - time).argmin())
+        return packing_in(run, frame)
 
 
 def plain(value: Any) -> Any:

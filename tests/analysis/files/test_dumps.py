@@ -17,15 +17,9 @@ CONTACT_COLUMNS = "id1 id2 f_n f_t slip"
 
 def block(step, what, columns, rows):
     """One snapshot as LAMMPS writes it, %.17g."""
-    return "\n".join(
-        [
-            f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {what}\n{len(rows)}",
-            f"ITEM: BOX BOUNDS pp ff pp\n{0.0:-1.16e} {3.95:-1.16e}\n-2 9\n-0.5 0.5",
-            f"ITEM: {'ATOMS' if what == 'ATOMS' else 'ENTRIES'} {columns}",
-            *(" ".join(f"{value:.17g}" for value in row) for row in rows),
-            "",
-        ]
-    )
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {what}\n{len(rows)}\nITEM: BOX BOUNDS pp ff pp\n"
+    head += f"{0.0:-1.16e} {3.95:-1.16e}\n-2 9\n-0.5 0.5\nITEM: {what} {columns}\n"
+    return head + "".join(" ".join(f"{value:.17g}" for value in row) + "\n" for row in rows)
 
 
 def dump_text(packing, step=0):
@@ -38,9 +32,9 @@ def dump_text(packing, step=0):
     disks = np.column_stack([1 + np.arange(n), 1 + packing.top, *known, floor_slip, np.zeros(n)])
     pairs = [(i + 1, j + 1, 0, 0, s) for i, j, s in zip(c.i, c.j, c.slip, strict=True) if j >= 0]
     pairs = [(j, i, *rest) if rng.random() < 0.5 else (i, j, *rest) for i, j, *rest in pairs] + [(1, 3, 0, 0, 0)]
-    return (
-        block(step, "ATOMS", DISK_COLUMNS, disks[rng.permutation(n)]),
-        block(step, "ENTRIES", CONTACT_COLUMNS, [pairs[k] for k in rng.permutation(len(pairs))]),
+    shuffled = [pairs[k] for k in rng.permutation(len(pairs))]
+    return block(step, "ATOMS", DISK_COLUMNS, disks[rng.permutation(n)]), block(
+        step, "ENTRIES", CONTACT_COLUMNS, shuffled
     )
 
 
@@ -51,10 +45,9 @@ def dump_path(tmp_path, cluster):
     (tmp_path / "bed.disks").write_text(disks)
     (tmp_path / "bed.contacts").write_text(contacts)
     law = cluster.law
-    (tmp_path / "bed.params").write_text(
-        f"kn {law.kn:.17g}\nkt {law.kt:.17g}\nmu {law.mu:.17g}\nexponent {law.exponent:.17g}\n"
-        "fx 0.5\nfy 3\ninertia_factor 0.5\n"
-    )
+    numbers = {name: getattr(law, name) for name in ("kn", "kt", "mu", "exponent")}
+    numbers |= {"fx": 0.5, "fy": 3, "inertia_factor": 0.5}
+    (tmp_path / "bed.params").write_text("".join(f"{key} {value:.17g}\n" for key, value in numbers.items()))
     return tmp_path / "bed.disks"
 
 

@@ -17,9 +17,8 @@ FEW = replace(LIMITS, all_windows=10)
 def buckled(path, fx):
     """The packing at a load without friction and without every third contact, so that it gives way."""
     packing = path(fx)
-    law, contacts = packing.law, packing.contacts
-    kept = np.arange(len(contacts.i)) % 3 > 0
-    fewer = Contacts(contacts.i[kept], contacts.j[kept], contacts.slip[kept])
+    law, c, kept = packing.law, packing.contacts, np.arange(len(packing.contacts.i)) % 3 > 0
+    fewer = Contacts(c.i[kept], c.j[kept], c.slip[kept])
     return replace(packing, law=replace(law, kt=1e-6 * law.kt), contacts=fewer)
 
 

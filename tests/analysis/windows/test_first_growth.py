@@ -50,21 +50,6 @@ def test_the_window_is_that_among_all_modes_on_one_rank_and_on_two(path, kind):
         assert each.result() == (found, ())
 
 
-@pytest.mark.long
-def test_windows_are_the_same_in_another_unit_of_time(path):
-    """One whose squares are beyond single precision."""
-    usual, loads, unit = of_kind(path, "medium"), np.array(path.grid[21:24]), 2.0**36
-
-    def fast(fx):
-        own = usual(fx)
-        return System(fx, unit**2 * own.stiffness, unit * own.damping, balance=own.balance)
-
-    for search in (lambda system: [first_window(system, loads, FEW)[0]], lambda system: find_windows(system, loads)):
-        for one, other in zip(search(fast), search(usual), strict=True):
-            assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error)
-            assert one.frequency == pytest.approx(unit * other.frequency, rel=1e-9)
-
-
 def oscillators(feed):
     """Twelve modes in pairs, each pair fed by the load times its number; dashpots take the same of all."""
 

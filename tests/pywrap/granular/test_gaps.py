@@ -33,6 +33,9 @@ def test_gaps_are_those_of_the_row(row):
     moved = 1e-8 * np.random.default_rng(0).standard_normal(here.coordinates)
     after = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
     np.testing.assert_allclose(found.gap - after.gap, found.rates(here) @ moved, atol=1e-14)
+    moved[:] = 0.9 * here.contacts.overlap.max() * (np.arange(here.coordinates) == 1)  # x of the second
+    apart = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
+    assert apart.gap.max() == pytest.approx(moved.max() + GAP, rel=1e-6)
 
 
 def test_a_push_that_closes_a_gap_is_too_large(row):
