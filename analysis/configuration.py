@@ -390,27 +390,24 @@ class Configuration(EqualToTheBit):
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
         if self.stiffness is not None and (np.any(np.asarray(parting) != 0.5) or np.any(sliding)):
-            raise ValueError(
-                "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
-                "sides of Coulomb's bound: leave parting and sliding out."
-            )
+            raise ValueError("K of this configuration is a difference of forces: leave parting and sliding out.")
         if self.stiffness is not None:
             return self.stiffness.copy()
-        matrix = self._assembled(self.contacts, parting)
-        if not self.spring:
-            return matrix
-        spring = spring_of_layer(self.spring, self.top, self.coordinates)
-        return csr_array(matrix + (spring if self._summing is None else self._summing.T @ spring @ self.constraint))
+        matrix, summing = self._assembled(self.contacts, parting), self._summing
+        if self.spring:
+            spring = spring_of_layer(self.spring, self.top, self.coordinates)
+            matrix = csr_array(matrix + (spring if summing is None else summing.T @ spring @ self.constraint))
+        return matrix
 
     def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
         """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
         if self.damping is not None:
             return self.damping.copy()
         matrix = self._assembled(as_springs(self.contacts))
-        if not self.drag_rate:
-            return matrix
-        moves = np.ones(self.coordinates) if self.constraint is None else self.coordinate_free
-        return csr_array(matrix + diags_array(self.drag_rate * self.coordinate_mass * moves))
+        if self.drag_rate:
+            moves = np.ones(self.coordinates) if self.constraint is None else self.coordinate_free
+            matrix = csr_array(matrix + diags_array(self.drag_rate * self.coordinate_mass * moves))
+        return matrix
 
     def assembled_operators(self) -> tuple[csr_array, csr_array]:
         """K and C."""

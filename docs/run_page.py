@@ -23,7 +23,7 @@ from pathlib import Path
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NAME = re.compile(r"# ([\w.-]+\.\w+)\n")
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?:\(\d+\))?$")
-PROGRESS = re.compile(r"(settling|calibrating|equilibria|samples|frames|searching|driving|states)\b[^;]*")
+PROGRESS = re.compile(r"(settling|calibrating|equilibria|samples|frames|searching|driving|states|scenes)\b[^;]*")
 """A line that a command says every minute of long work: on a fast machine there is none."""
 NOISE = 1e-9
 LIMIT = 900.0

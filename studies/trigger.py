@@ -141,7 +141,7 @@ def bisect_amplitude(wave: Wave) -> Row:
         with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, amplitude, omega, target) as dynamics:
             dynamics.halt_above(v0)
             dynamics.advance(steps)
-            return dynamics.steps * dt if dynamics.steps < steps else None
+            return engine.steps * dt if engine.steps < steps else None
 
     below, above = expected["predicted"] * (1 - FIRST_BRACKET), expected["predicted"] * (1 + FIRST_BRACKET)
     reached, holds = None, False  # whether the wave `below` is known not to trigger

@@ -128,16 +128,18 @@ def faultgouge(faultgouge_in, tmp_path: Path) -> Callable[..., subprocess.Comple
 @pytest.fixture(scope="session")
 def faultgouge_here_in() -> Callable[..., subprocess.CompletedProcess]:
     """Runs the command in a folder within this process, which saves the second that a process takes to start."""
+    from faultgouge.commands import program as made
+
+    program = made()  # once: to put all commands together takes as long as some of them
 
     def run(folder: Path, *words: object, code: int | None = 0) -> subprocess.CompletedProcess:
         from faultgouge.cli import fail
-        from faultgouge.commands import program
 
         out, err, exit_code, before = io.StringIO(), io.StringIO(), 0, Path.cwd()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             os.chdir(folder)
             try:
-                program()([str(word) for word in words], standalone_mode=False)
+                program([str(word) for word in words], standalone_mode=False)
             except Exception as error:
                 with pytest.raises(SystemExit) as ended:
                     fail(error)

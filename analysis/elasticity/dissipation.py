@@ -73,10 +73,8 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
     c, t = configuration.contacts, np.asarray(time, float)
     moved, speed = np.asarray(displacement, float), np.asarray(velocity, float)
     if moved.shape != (len(t), configuration.coordinates) or speed.shape != moved.shape or np.any(np.diff(t) <= 0):
-        raise BadInputError(
-            f"A motion has times that ascend, T of them, and displacements and velocities of shape (T, "
-            f"{configuration.coordinates}), not {t.shape}, {moved.shape} and {speed.shape}."
-        )
+        shapes = f"shape (T, {configuration.coordinates}), not {t.shape}, {moved.shape} and {speed.shape}"
+        raise BadInputError(f"A motion has T times that ascend, and displacements and velocities of {shapes}.")
     if configuration.stiffness is not None:
         raise BadInputError("The law of each contact is needed, and this packing has K by differences of forces.")
     whole = derive_frozen(configuration, free=np.ones(len(configuration), np.bool_))

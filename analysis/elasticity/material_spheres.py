@@ -181,7 +181,8 @@ def spheres_of_material(
     }  # fmt: skip
     made = Configuration(
         dimension=dimension, position=place[:, :dimension], radius=radius, mass=mass, inertia=0.4 * mass * radius**2,
-        contacts=LinearisedContacts(**given | forces), box=box, origin=origin, periodic=periodic, slips_known=known,
+        contacts=LinearisedContacts(**given | forces), box=box, origin=np.asarray(origin),
+        periodic=np.asarray(periodic), slips_known=known,
         load=np.zeros((len(radius), 2, 3)), remarks=() if known else (UNKNOWN_SLIPS,),
     )  # fmt: skip
     return derive_frozen(made, load=-made.contact_force)

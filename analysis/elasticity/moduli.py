@@ -171,10 +171,8 @@ class ElasticModuli:
         bound = f", {counted(self.at_bound, 'contact')} at Coulomb's bound taken as sticking" if self.at_bound else ""
         over = "" if self.frequency is None else f" at omega = {self.frequency:g}"
         names = f"E = {self.young:.6g}, nu = {self.poisson:.4g}, G = {self.shear:.6g}, bulk {self.bulk:.6g}"
-        return (
-            f"<ElasticModuli{over}: {names}, anisotropy {self.anisotropy:.2g}, odd part {odd:.2g} of the tensor; "
-            f"{self.box}{bound}>"
-        )
+        more = f"anisotropy {self.anisotropy:.2g}, odd part {odd:.2g} of the tensor; {self.box}{bound}"
+        return f"<ElasticModuli{over}: {names}, {more}>"
 
 
 def volume_of(configuration: Configuration, volume: float | None = None) -> tuple[float, str]:
@@ -192,10 +190,8 @@ def volume_of(configuration: Configuration, volume: float | None = None) -> tupl
         low, high, along = sides.get((axis, 1.0)), sides.get((axis, -1.0)), np.abs(c.normal[:, axis])
         tilted = np.any(c.wall & (along > FLAT_NORMAL) & (along < 1 - FLAT_NORMAL))
         if low is None or high is None or tilted:
-            raise BadInputError(
-                f"The packing has no volume: along {AXIS_NAMES[axis]} it is neither periodic nor between two flat "
-                "walls that it touches; give volume=, the volume (area of disks) that is meant."
-            )
+            open_side = f"along {AXIS_NAMES[axis]} it is neither periodic nor between two flat walls that it touches"
+            raise BadInputError(f"The packing has no volume: {open_side}; give volume=, or the area of disks.")
         edges[axis] = 0.0
         edges[axis, axis] = high - low
         words.append(f"between walls at {AXIS_NAMES[axis]} = {low:g} and {high:g}")
@@ -281,10 +277,7 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     _require_laws(configuration, "The moduli")
     d, c = configuration.dimension, configuration.contacts
     if not np.all(configuration.periodic[:d]) or configuration.constraint is not None or c.wall.any():
-        raise BadInputError(
-            "Elastic moduli are those of a box that is periodic along all of its axes and has no walls or lids; "
-            "stress(packing) has the mean stress between walls."
-        )
+        raise BadInputError("Elastic moduli are those of a box periodic along all of its axes, without walls and lids.")
     volume, box = volume_of(configuration)
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:
@@ -298,10 +291,8 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     moved = response.solve(loads)
     lacks = float(np.linalg.norm(loads - response.matrix @ moved) / (np.linalg.norm(loads) or 1.0))
     if lacks > UNSOLVED:
-        raise BadInputError(
-            f"The packing has no elastic moduli: under a strain {lacks:.1g} of the forces stay unbalanced, as they "
-            "drive a motion without stiffness."
-        )
+        loose = f"under a strain {lacks:.1g} of the forces stay unbalanced, as they drive a motion without stiffness"
+        raise BadInputError(f"The packing has no elastic moduli: {loose}.")
     by_motion = [(weight, contact_derivatives(each)) for weight, each in parts]
 
     def of_stress(u: Complexes, w: Complexes) -> Complexes:
@@ -326,10 +317,7 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
 
 def _require_laws(configuration: Configuration, what: str) -> None:
     if configuration.stiffness is not None:
-        raise BadInputError(
-            f"{what} need the law of each contact, and this packing has K and C by differences of LAMMPS's forces: "
-            "see its remarks for what is not measured as a law."
-        )
+        raise BadInputError(f"{what} need the law of each contact; K of this packing is a difference of forces.")
 
 
 class QuietResponse:

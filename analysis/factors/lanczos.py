@@ -125,10 +125,8 @@ def compare_slices(*borders: Border) -> None:
     """Raise a SliceError if a slice gives its first eigenvalue another number than the slice just before it."""
     for before, after in pairwise(borders):
         if after.modes[0] == before.modes[1] and not abs(after.first - before.beyond) <= 0.01 * after.spacing:
-            raise SliceError(
-                f"the eigenvalue of number {after.modes[0]} is {before.beyond:.10g} from one shift and "
-                f"{after.first:.10g} from the next: one is missing in between"
-            )
+            two = f"{before.beyond:.10g} from one shift and {after.first:.10g} from the next"
+            raise SliceError(f"the eigenvalue of number {after.modes[0]} is {two}: one is missing in between")
 
 
 class SlicedSpectrum:
@@ -212,7 +210,7 @@ class SlicedSpectrum:
                     break
             if krylov.full:
                 raise SliceError(
-                    f"a Krylov space of {krylov.used} vectors does not hold the eigenvalues about {shift:.6g}"
+                    f"the eigenvalues about {shift:.6g} are not in a Krylov space of {krylov.used} vectors"
                 )
             krylov.extend(krylov.used + self.sizes.looks * block)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
@@ -228,11 +226,9 @@ class SlicedSpectrum:
             quotients += np.einsum("ij,ij->j", vectors[rows], self.given[rows] @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
         if abs(quotients[worst] - values[worst]) > self.sizes.vector_residual * part.border.spacing:
+            two = f"{values[worst]:.10g} from the factors and {quotients[worst]:.10g} from the matrix"
             number = part.first + part.own.start + worst
-            raise SliceError(
-                f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
-                f"{quotients[worst]:.10g} from the matrix: the factors are inaccurate; take other loads"
-            )
+            raise SliceError(f"eigenvalue {number} is {two}: the factors are inaccurate; take other loads")
         return part
 
 

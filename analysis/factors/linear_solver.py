@@ -159,9 +159,8 @@ class SparseSolver:
             return step[active]
 
         # from the right, so that its residual is a force
-        operator = LinearOperator(
-            self._matrix.shape, lambda residual: self._matrix @ apply_preconditioner(residual), dtype=np.float64
-        )
+        shape, both = self._matrix.shape, lambda residual: self._matrix @ apply_preconditioner(residual)
+        operator = LinearOperator(shape, both, dtype=np.float64)
         found, failed = gmres(operator, force[active], rtol=RESIDUAL_SHARE, restart=GMRES_ITERATIONS, maxiter=1)
         step = np.zeros_like(force)
         step[active] = apply_preconditioner(found)

@@ -192,22 +192,10 @@ def growth_rate(eigenvalue: complex) -> float:
 
 
 def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
-    r"""How many of the disks take part in a mode, as a share.
+    r"""How many of the disks take part in modes, whose mass-weighted vectors are columns, as a share, shape (k,).
 
-    With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
-    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike. Of a
-    complex mode :math:`e_i` is the mean over a period.
-
-    Parameters
-    ----------
-    right : ndarray, shape (axes N, k)
-        Right vectors in mass-weighted coordinates, in columns.
-    axes : int
-        Coordinates of a particle: 3 of disks, 6 of spheres.
-
-    Returns
-    -------
-    ndarray, shape (k,)
+    With :math:`e_i` the kinetic energy of disk i, rotation included, a mean over a period, the ratio is
+    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike.
     """
     energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))

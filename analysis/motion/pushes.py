@@ -87,16 +87,8 @@ def follow_pushes(
 ) -> FieldsByName:
     """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    sticking, may_rest : float, bool
-        Growth rate with sticking contacts, 1 / time, and whether these are not known to grow.
-    time : float, optional
-        How long; until the motion has settled by default.
-    pushes : int
-        How many; the opposite of each is followed, too.
+    `sticking` is the growth rate with sticking contacts, 1 / time, and `may_rest` whether these are not known to grow.
+    The opposite of each push is followed, too, for the time, or until the motion has settled.
 
     Returns
     -------
@@ -183,20 +175,8 @@ def follow_creep(
 ) -> FieldsByName:
     """How far vibration carries particles whose contacts have two derivatives: `Stability.creep`.
 
-    Random pushes and their opposites are followed until little is left to come.
-
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of a configuration without contacts at Coulomb's bound.
-    pushes : int
-        How many.
-    time : float, optional
-        How long.
-    decay : float
-        -Re s of the slowest motion, 1 / time; 0 if that is not known, or nothing decays.
-    free : int
-        Motions that no force opposes.
+    Random pushes and their opposites are followed until little is left to come, or for some time. `decay` is -Re s of
+    the slowest motion, 1 / time, 0 if that is not known or nothing decays; `free` motions no force opposes.
 
     Returns
     -------

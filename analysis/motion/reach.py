@@ -58,12 +58,7 @@ OVERLAP_CHANGE = 0.1
 def reach_of(system: OneSidedSystem, free: int = 0) -> FieldsByName | None:
     """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of a configuration without contacts at Coulomb's bound.
-    free : int
-        Motions that no force opposes.
+    No contact is at Coulomb's bound, and `free` motions no force opposes.
 
     Returns
     -------

@@ -89,20 +89,10 @@ def motion_under_load(
 ) -> FieldsByName:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of a configuration in which no small motion is known to grow.
-    direction : ndarray, shape (coordinates, 1)
-        Forces per unit of time.
-    time : float, optional
-        How long motion is followed; until it is steady by default.
-    free : int
-        Motions that no force opposes.
-    decays : bool
-        Whether it is known that no motion grows with sticking contacts: otherwise motion is followed.
-    residual : float
-        Root mean square displacement of the particles by the residual forces, length.
+    No small motion is known to grow. `direction` has forces per unit of time, shape (coordinates, 1), `free` motions no
+    force opposes, and `residual` is the root mean square displacement of the particles by the residual forces, length.
+    The motion is followed for the time, or until it is steady; where it is known that motion with sticking contacts
+    `decays` the drift may be solved for.
 
     Returns
     -------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, floats
+from ..arrays import Floats, floats, frozen
 from ..errors import BadInputError
 from .compensated import DoubleDouble, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
@@ -55,17 +55,12 @@ def contact_geometry(
     overlap[0][floor], overlap[1][floor] = exact_sum(height[0], height[1] - branch[1][floor, 1])
     if np.any(distance[~floor] == 0):
         k = np.flatnonzero(~floor & (distance == 0))[0]
-        raise BadInputError(
-            f"Disks {i[k]} and {j[k]} have the same centre, so that their contact has no direction: separate them."
-        )
-    normal = np.empty_like(branch[0])
-    normal[~floor] = branch[0][~floor] / distance[~floor, None]
+        both = f"Disks {i[k]} and {j[k]} have the same centre"
+        raise BadInputError(f"{both}, so that their contact has no direction: separate them.")
+    normal = branch[0] / np.where(floor, 1.0, distance)[:, None]
     normal[floor] = (0.0, 1.0)
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
-    geometry = ContactGeometry(normal=normal, tangent=tangent, distance=distance, overlap=overlap[0])
-    for array in geometry:
-        array.flags.writeable = False
-    return geometry, branch, overlap
+    return ContactGeometry(*(frozen(each) for each in (normal, tangent, distance, overlap[0]))), branch, overlap
 
 
 def nearest_image(difference: Floats, box_length: float | None) -> Floats:
@@ -105,11 +100,8 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
     branch = separation(position[i], None, position[j], None, box_length)
     near = overlap_and_distance(branch, exact_sum(radius[i], radius[j]))[0][0] > 0
     floor = np.flatnonzero(radius - position[:, 1] > 0)
-    return Contacts(
-        np.concatenate([i[near], floor]),
-        np.concatenate([j[near], np.full(len(floor), FLOOR)]),
-        np.zeros(near.sum() + len(floor)),
-    )
+    i, j = np.concatenate([i[near], floor]), np.concatenate([j[near], np.full(len(floor), FLOOR)])
+    return Contacts(i, j, np.zeros(len(i)))
 
 
 def neighbour_tree(position: Floats, box_length: float | None) -> cKDTree:

@@ -200,9 +200,7 @@ class MindlinLaw:
         if self.rescaled and self.coulomb:
             raise ValueError("rescaled and coulomb are two histories: a law has one of them.")
         if self.rescaled and self.exponent < LEAST_RESCALED:
-            raise ValueError(
-                f"a rescaled history needs an exponent of {LEAST_RESCALED} or more: with less, energy is created."
-            )
+            raise ValueError(f"a rescaled history needs an exponent from {LEAST_RESCALED} on: it would create energy.")
 
     @property
     def frictional(self) -> bool:

@@ -17,21 +17,11 @@ def linearise_contacts(
     """
     grows, falls = (law.derivatives(overlap, slip, share) for share in (0.0, 1.0))
     along, across = law.dashpots(overlap, slip)
-    count = len(overlap)
+    force, none, no = grows.normal_force, np.zeros(len(overlap)), np.zeros(len(overlap), np.bool_)
     return LinearisedContacts(
-        overlap=overlap,
-        lever_slope=np.zeros(count),
-        normal_force=grows.normal_force,
-        tangential_force=grows.tangential_force[:, None] * tangent,
-        normal_stiffness=grows.normal_stiffness,
-        tangential_stiffness=-grows.slip_derivative,
-        closing=grows.overlap_derivative[:, None] * tangent,
-        parting=falls.overlap_derivative[:, None] * tangent,
-        friction=law.mu * grows.normal_force if law.frictional else np.full(count, np.inf),
-        sliding=np.zeros(count, dtype=np.bool_),
-        normal_dashpot=along,
-        tangential_dashpot=across,
-        slider=np.full(count, law.coulomb),
-        viscous_slider=np.zeros(count, dtype=np.bool_),
-        **where,
-    )
+        overlap=overlap, lever_slope=none, normal_force=force, normal_stiffness=grows.normal_stiffness,
+        tangential_force=grows.tangential_force[:, None] * tangent, tangential_stiffness=-grows.slip_derivative,
+        closing=grows.overlap_derivative[:, None] * tangent, parting=falls.overlap_derivative[:, None] * tangent,
+        friction=law.mu * force if law.frictional else none + np.inf, sliding=no, normal_dashpot=along,
+        tangential_dashpot=across, slider=no | law.coulomb, viscous_slider=no, **where,
+    )  # fmt: skip

@@ -300,13 +300,10 @@ class Packing(EqualToTheBit):
         n = len(self)
         _check_partners(contacts, n)
         return derive_frozen(
-            self,
-            position=floats("position", position, (n, 2)),
-            angle=floats("angle", angle, (n,)),
-            contacts=contacts,
+            self, position=floats("position", position, (n, 2)), angle=floats("angle", angle, (n,)), contacts=contacts,
             position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
             fx=self.fx if fx is None else number("fx", fx),
-        )
+        )  # fmt: skip
 
     def with_dissipation(self, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> "Packing":
         """The same equilibrium with dashpots of every contact and drag, by default none: they have no part in where a

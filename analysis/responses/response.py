@@ -187,10 +187,8 @@ def layer_force(packing: HasConfiguration, amplitude: float) -> Floats:
         If the packing has no upper layer, as no Configuration has.
     """
     if not packing.top.any():
-        raise BadInputError(
-            "layer_force acts on an upper layer, and this packing has none: put together the force on its coordinates, "
-            f"an array of shape {(packing.coordinates,)}."
-        )
+        forces = f"forces of shape {(packing.coordinates,)}"
+        raise BadInputError(f"layer_force acts on an upper layer, and this packing has none: give {forces} instead.")
     force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top
     return force

@@ -55,10 +55,8 @@ class Signal:
     def __post_init__(self) -> None:
         set_frozen(self, time=np.array(self.time, dtype=np.float64), value=np.array(self.value, dtype=np.float64))
         if self.time.ndim != 1 or self.time.shape != self.value.shape or len(self.time) < 2:
-            raise SignalError(
-                f"a signal has two columns of one length with two rows or more, and not the shapes {self.time.shape} "
-                f"and {self.value.shape}: give it a beginning and an end"
-            )
+            shapes = f"{self.time.shape} and {self.value.shape}"
+            raise SignalError(f"a signal has two columns of one length with two rows or more, not the shapes {shapes}")
         for name, column in (("time", self.time), ("value", self.value)):
             for row in np.flatnonzero(~np.isfinite(column))[:1]:
                 what = f"row {row + 1} of the signal has the {name} {column[row]}"

@@ -128,15 +128,7 @@ def track_point(state: Motions, drift: Complexes, *members: int) -> TrackPoint:
 
 
 class Track:
-    """A motion between two loads at which it is known.
-
-    Parameters
-    ----------
-    at : callable
-        Load -> System.
-    points : tuple of two TrackPoint
-        The motion at the ends.
-    """
+    """A motion between two loads, at which it is known (`points`); `at` gives the system of a load."""
 
     def __init__(self, at: Callable[[float], System], points: tuple[TrackPoint, TrackPoint]) -> None:
         self.at, self.points, self.ends = at, points, (points[0][0], points[1][0])

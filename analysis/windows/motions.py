@@ -254,14 +254,7 @@ def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexe
 class Inverse:
     """(A - sigma)^(-1) or (Z - sigma)^(-1) next to a point, from factors of A - sigma or sigma^2 + sigma G + A.
 
-    Here Z is that of displacements x and velocities s x, in the scene's own units.
-
-    Attributes
-    ----------
-    shift : complex
-        sigma.
-    damping : scipy.sparse.csr_array or None
-        G on the active coordinates.
+    Here Z is that of displacements x and velocities s x, in the scene's own units; sigma is `shift`, and `damping` G.
     """
 
     def __init__(self, system: System, point: complex) -> None:

@@ -105,8 +105,7 @@ def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalF
     found = []
     for pair in _follow_pair(packings, eigenvalue):
         dual = np.linalg.solve(pair.left.T @ pair.right, pair.left.T).T
-        block = dual.T @ (pair.system.stiffness @ pair.right)
-        found.append(NormalForm.of_block(block, pair.discriminant, pair.right, dual))
+        found.append(NormalForm.of_block(pair.block, pair.discriminant, pair.right, dual))
     return found
 
 

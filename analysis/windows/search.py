@@ -67,20 +67,10 @@ PLACES = np.linspace(0, 1, 41)[1:-1]
 
 
 class Search:
-    """The windows of a family of systems, from load to load.
+    """The windows of a family of systems, from load to load; narrower ones than `narrowest`, force, are not looked for.
 
-    Parameters
-    ----------
-    system : callable
-        Load -> System.
-    narrowest : float
-        Windows narrower than this are not looked for, force.
-    few : callable, optional
-        Names the few motions that may change.
-    first : bool
-        Whether the walk ends with the first window.
-    decompose : callable
-        System -> all of its motions.
+    `few` names the few motions that may change, and `decompose` gives all motions of a system; with `first` the walk
+    ends with the first window.
     """
 
     def __init__(
@@ -413,17 +403,11 @@ def lowest(d0: Any, s0: Any, d1: Any, s1: Any) -> tuple[Any, Any]:
 
 
 def excursion(a: Any, slope_a: Any, b: Any, slope_b: Any) -> tuple[Floats, Floats]:
-    """Where pairs of motions have another sign of Re s in 0 < t < 1 than at both ends.
+    """Where pairs of motions have another sign of Re s in 0 < t < 1 than at both ends, from two s and two slopes at
+    t = 0 and at t = 1, each of shape (P,).
 
-    Parameters
-    ----------
-    a, slope_a, b, slope_b : two ndarrays of complex, shape (P,)
-        s of the two motions at t = 0, their slopes, and those at t = 1.
-
-    Returns
-    -------
-    width, place : ndarray, shape (P,)
-        Share of the increment, zero where there is no such place, and where Re s is farthest on the other side.
+    Returned are the share of the increment, zero where there is no such place, and where Re s is farthest on the other
+    side.
     """
     mean = cubic(*(0.5 * (each[0] + each[1]) for each in (a, slope_a, b, slope_b)))
     gap_a, gap_b = a[0] - a[1], b[0] - b[1]

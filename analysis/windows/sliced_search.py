@@ -188,21 +188,20 @@ class SlicedSearch:
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
         report_progress(f"{where}: {before} of {count} modes are known")
 
-        def search_slices() -> list[SliceResult]:
+        def search_slices() -> Iterator[SliceResult]:
             """Those of this rank."""
-            found: list[SliceResult] = []
             done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
             for basis in self._bases(places[0], stored):
                 done += basis.own.stop - basis.own.start
                 report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
-                found.append(self._search_slice(basis, places))
+                found = self._search_slice(basis, places)
                 if folder is not None:
-                    keep_result(folder, found[-1])
-            return found
+                    keep_result(folder, found)
+                yield found
 
-        every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
-        self.crowded = self.crowded or any(each.crowded for each in every)
-        return [candidate for each in every for candidate in each.candidates]
+        every = self.ranks.together(lambda: list(search_slices()))
+        self.crowded |= any(each.crowded for each in chain(stored, *every))
+        return [candidate for each in chain(stored, *every) for candidate in each.candidates]
 
     def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
         """The windows of the small families between the loads, of one slice's own motions."""

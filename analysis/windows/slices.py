@@ -248,16 +248,14 @@ def keep_result(folder: Path, found: SliceResult) -> None:
 def kept_results(folder: Path) -> list[SliceResult]:
     """The results in a folder by the order of the spectrum, but for those that are damaged."""
     found = []
+    damaged = OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile
     for path in folder.glob("*-*.npz"):
-        damaged = suppress(OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile)
-        with damaged, np.load(path) as data:
-            first, stop = (int(number) for number in data["modes"])
-            candidates = [
-                Candidate(int(k.real), float(a.real), float(b.real), complex(value), complex(slope))
-                for k, a, b, value, slope in data["motions"]
-            ]
-            border = Border((first, stop), *map(float, data["border"]))
-            found.append(SliceResult(border, candidates, bool(data["crowded"])))
+        with suppress(*damaged), np.load(path) as data:
+            modes, border, motions, crowded = (
+                data[name].tolist() for name in ("modes", "border", "motions", "crowded")
+            )
+            candidates = [Candidate(int(k.real), a.real, b.real, *rest) for k, a, b, *rest in motions]
+            found.append(SliceResult(Border(tuple(modes), *border), candidates, crowded))
     return sorted(found, key=lambda each: each.border.modes)
 
 

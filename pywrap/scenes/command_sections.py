@@ -1,8 +1,7 @@
 """The sections of a scene that each command reads.
 
 A command receives a scene with only the sections that it reads: other sections cannot make it fail, and are not part of
-its output. In the other sections only the keys are checked, because a misspelled key is always a mistake. A missing
-section that a command requires is reported before any work starts.
+its output. Of these only the keys are checked, because a misspelled key is always a mistake.
 
 A section such as [trigger] belongs to one study, which registers its model in its file, ``faultgouge/studies/NAME.py``;
 a scene with the section [NAME] imports this file. Numbers of a section that may have a unit say so in their annotation:
@@ -28,15 +27,7 @@ UNDAMPED_SECTIONS = (*PATH, "perturb", "friction")
 
 @dataclass(frozen=True)
 class Command:
-    """The sections of a scene that a command reads.
-
-    Attributes
-    ----------
-    reads : tuple of str
-        Sections, or a single key of a section as in "perturb.inertia_factor".
-    needs : tuple of str
-        Those that it cannot do without.
-    """
+    """Sections of a scene that a command reads, or single keys as in "perturb.inertia_factor", and what it needs."""
 
     reads: tuple[str, ...]
     needs: tuple[str, ...] = ()

@@ -18,16 +18,9 @@ from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Sec
 
 
 class SettlingLoad(Section):
-    """packing.settle_at: the load and the stiffness under which a packing settles, if these are not the scene's.
+    """packing.settle_at: F_y and k_n under which a packing settles; what is left out is the scene's.
 
-    Only the ratio of k_n to F_y matters. What is left out is the scene's.
-
-    Attributes
-    ----------
-    fy : float or None
-        Force on each disk of the upper layer.
-    kn : float or None
-        Normal stiffness, force / length^exponent.
+    Only the ratio of k_n to F_y matters.
     """
 
     fy: Annotated[Positive | None, FORCE] = None
@@ -39,31 +32,25 @@ class GeneratedPacking(Section):
 
     Attributes
     ----------
-    disks : int
-        Number of disks N, the upper layer included; at most ten millions, a slip of the pen beyond.
-    radii : tuple of float
-        Radii, length, each for an equal share of the disks, upper layer included.
+    disks, radii, seed : int, tuple of float, int
+        Number of disks, the upper layer included; radii, each of an equal share; seed of the loose start, and of
+        further ones, should the disks not come to rest from the first.
     width : float
-        Width of the box, length. The paper gives none; this one makes 100 disks about square.
+        Width of the box. The paper gives none; this one makes 100 disks about square.
     top : int
-        Number of disks in the upper layer: free disks, above all others at the start, the load on each. By default a
-        tenth of the disks, and at least as many as fit side by side (`loose.layer_size`). The paper gives no number.
-    seed : int
-        Seed of the loose start; and of further ones, should the disks not come to rest from the first.
+        Disks of the upper layer: free disks, above all others at the start, the load on each. By default a tenth, and
+        at least as many as fit side by side (`layer_size`). The paper gives no number.
     periodic : bool
         Whether x is periodic, which the paper does not say. With false the sides are open, and nothing holds the disks
         there: that is refused, unless the packing is one row of disks, all of the upper layer.
     settle_friction : bool
-        False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
-        True: settled with friction, so that the packing carries tangential load from the start. The paper
-        does not say which.
+        False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0. True:
+        with friction, so that the packing carries tangential load from the start. The paper does not say which.
     settle_at : SettlingLoad or None
         The load under which the packing settles, before it is carried to the scene's: scenes that differ in their load
-        or their stiffness then have one packing. None: it settles under the load of the scene.
-    masses : {"equal", "spheres"}
-        Equal masses, as in the paper; or those of spheres of one material, as the cube of the radius.
-    mass : float or None
-        Mass of the smallest disks. None: one, the paper's unit.
+        or their stiffness then have one packing.
+    masses, mass : {"equal", "spheres"}, float or None
+        Equal masses, as in the paper, or as the cube of the radius; mass of the smallest disks, by default one.
     """
 
     disks: int = Field(100, gt=0, le=10_000_000)
@@ -113,13 +100,11 @@ class StoredPacking(Section):
     Attributes
     ----------
     file : Path
-        A run.h5, a packing.json, or a file of another code as `faultgouge import` takes it. In a scene, a relative path
-        counts from the folder of the scene's file; here it is absolute.
-    top : int or str or None
-        The upper layer, where the file does not say it, or other than it says: a count of the highest, "type:2",
-        "ids:1,4,7-9", or a region such as "y>10". Not of a run.h5.
-    frame : int or None
-        Which of several frames; by default the last. Not of a run.h5, whose first is taken.
+        A run.h5, of which the first frame is taken, or a file of another code as `faultgouge import` takes it. Relative
+        to the folder of the scene's file in a scene; here it is absolute.
+    top, frame : int or str, int
+        Not of a run.h5: the upper layer, where the file does not say it, or other than it says (a count of the highest,
+        "type:2", "ids:1,4,7-9", or a region such as "y>10"), and which of several frames, by default the last.
     """
 
     file: Annotated[Path, Field(strict=False), NamesFile()]

@@ -1,19 +1,15 @@
 r"""The initial loose random packing: disks that do not touch, with the upper layer above the others.
 
-The disks have equal shares of the given radii. In the upper layer, the radii alternate. The upper layer is evenly
-spaced along x, in as many tiers as needed to keep its disks apart: if the layer, stretched out, is wider than the box,
-it closes the box and cannot sink into the bed. The other disks are shuffled over the cells of a lattice that is wide
-enough for the largest disk, each at a random place inside its cell. No two disks overlap, for any seed, at a cost
-proportional to their number. The paper says only "loosely packed disks". A packing as open as this, with a third of the
-area filled, does not carry load: the weightless disks give way, and the upper layer, if it alone were loaded, would
-sink to the floor. Settling therefore lays a bed first.
+The upper layer, whose radii alternate, is evenly spaced along x, in as many tiers as needed to keep its disks apart: if
+it is wider than the box when stretched out, it closes the box and cannot sink into the bed. The other disks are
+shuffled over the cells of a lattice that is wide enough for the largest disk, each at a random place inside its cell.
+No two disks overlap, for any seed, at a cost proportional to their number. The paper says only "loosely packed disks".
+A third of the area is filled, which carries no load: settling lays a bed first.
 
 Even on a bed a heavy layer may sink, like a heavy liquid through a light one. Without friction a bed bears shear
-stresses of at most a tenth of its pressure, and this pressure is the weight of the layer above. Where the layer is
-thin, the bed is pushed up, the layer slides off the bulge, and becomes thinner still. A layer of one or two disks
-varies in thickness by more than a tenth, because it is made of disks, and a wide layer will have a weak spot. A layer
-of several disks comes to rest. A tenth of all disks (the paper's 10 of 100, if those are its layer) keeps the geometry
-the same for packings of all sizes.
+stresses of at most a tenth of its pressure, which is the weight of the layer above. Where the layer is thin, the bed is
+pushed up, the layer slides off the bulge, and becomes thinner still. A layer of one or two disks varies in thickness by
+more than a tenth; a layer of several disks comes to rest. A tenth of all disks keeps the geometry of all sizes.
 """
 
 import numpy as np
@@ -29,13 +25,7 @@ LAYER = 0.1
 
 
 def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
-    """Number of disks of an upper layer that comes to rest: a tenth of all, and enough to close the box.
-
-    Parameters
-    ----------
-    radii : tuple of float
-        Radii, length, each of an equal share of the disks.
-    """
+    """Number of disks of an upper layer that comes to rest: a tenth of all, and enough to close the box."""
     side_by_side = width / (2 * float(np.mean(radii)))
     return min(disks, max(1, round(max(LAYER * disks, side_by_side))))
 
@@ -43,29 +33,11 @@ def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
 def random_start(
     disks: int, radii: tuple[float, ...], top: int, width: float, seed: int, *, periodic: bool = True, draw: int = 0
 ) -> Disks:
-    """Disks above the floor that overlap nowhere, the same on every platform for one seed.
+    """Disks above the floor that overlap nowhere, the same on every platform for one seed of numpy's PCG64.
 
-    Parameters
-    ----------
-    disks : int
-        Number of disks, the upper layer included.
-    radii : tuple of float
-        Radii, length; each is given to an equal share of the disks, a remainder to the first ones.
-    top : int
-        Number of disks in the upper layer, the last ones by index.
-    width : float
-        Width of the box, 0 <= x < width, length.
-    seed : int
-        Seed of numpy's PCG64.
-    periodic : bool
-        Whether x is periodic. All disks lie within the width in either case.
-    draw : int
-        Which of the loose starts of the seed: 0 is the first.
-
-    Returns
-    -------
-    Disks
-        Positions, radii, the upper layer and the period; the floor is y = 0.
+    Each radius goes to an equal share of the disks, a remainder to the first ones. The upper layer are the last `top`
+    disks by index. All disks lie within the width, 0 <= x < width, whether x is periodic or not; the floor is y = 0.
+    `draw` is which of the loose starts of the seed: 0 is the first.
     """
     sizes = np.resize(np.sort(radii), disks)
     diameter = 2 * sizes.max()

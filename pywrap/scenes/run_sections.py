@@ -30,11 +30,7 @@ from .validation import (
 class Inertia(Section):
     """The key of [perturb] that spectra and onsets read, too.
 
-    Attributes
-    ----------
-    inertia_factor : float
-        I_0 in I = I_0 m R^2: 1 in the paper, 1/2 for a uniform disk. `Scene.inertia_factor` hands it to
-        spectra and onsets as well.
+    I_0 in I = I_0 m R^2 is 1 in the paper, and 1/2 for a uniform disk.
     """
 
     inertia_factor: Positive = 1.0
@@ -78,27 +74,19 @@ class WithSignal(Section):
 class Perturb(WithSignal, Inertia):
     """[perturb] an undamped run from an equilibrium, and its forcing: a cos(omega t), a pulse, or a signal of a file.
 
-    Its keys are that of `Inertia`, and these.
-
     Attributes
     ----------
     fx : float or None
         F_x of the equilibrium. None: chosen by the onset (:func:`~faultgouge.pywrap.onset.load_at_onset`).
-    time : float
-        Length of the run, time.
-    time_step : float or None
-        Step of velocity Verlet, time. None: from the largest eigenvalue of K.
+    time, time_step : float
+        Length of the run, and step of velocity Verlet; None: from the largest eigenvalue of K.
     target : {"top", "all"} or tuple of int
-        The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say
-        which.
-    amplitude : float
-        a, force on each forced disk along x, or, on the floor, largest velocity of the floor; 0 means no forcing. The
-        paper's is 1e-12.
-    omega : float or None
-        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks. The paper's is 0.01.
+        The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say which.
+    amplitude, omega : float
+        Force on each forced disk along x, or largest velocity of the floor (0: no forcing; the paper's is 1e-12), and
+        angular frequency; of a pulse that at which its spectrum peaks. The paper's is 0.01.
     signal : str or None
-        "pulse", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative path counts
-        from the folder of the scene's file. None: a cos(omega t).
+        "pulse", or a file: two columns (time, value), or a record that ObsPy reads. None: a cos(omega t).
     channel : str or None
         Which trace of a record with several: the end of its id, such as "EHZ".
     scale, stretch : float or None
@@ -187,30 +175,21 @@ class Drive(WithSignal):
     spring : float or "rigid"
         Stiffness for each disk of the upper layer, force / length. "rigid": the disks of the layer have the velocity of
         the far end along x, and are free along y and in rotation.
-    velocity : float or None
-        Of the far end, length / time.
-    protocol : tuple of (float, float) or None
-        In place of `velocity`: velocities one after the other, each with its time; 0 holds the far end. The last
-        velocity goes on if the run is longer.
+    velocity, protocol : float, or tuple of (float, float)
+        Of the far end; or velocities one after the other, each with its time; 0 holds the far end. The last one goes
+        on.
     until : float or None
-        Length of the run, time; by default that of the protocol, or twice the time in which the spring loads the layer
-        to mu F_y for each of `slips`.
-    slips : int or None
-        The run ends after so many slips. None: it goes on until `until`.
+        Length of the run; by default that of the protocol, or twice the time in which the spring loads the layer to
+        mu F_y for each of `slips`, after which the run ends.
     states : float or None
         Time between two stored states; by default that in which the spring loads the layer by 0.016 mu F_y, or a rigid
         drive moves by 0.01 of the smallest diameter.
-    signal : str or None
-        A force, or a motion of the floor, that comes on the way: "pulse", or a file as in [perturb]. In a scene, a
-        relative path counts from the folder of the scene's file.
-    at : float or None
-        When the signal begins, time.
-    omega : float or None
-        Angular frequency at which the spectrum of a pulse peaks, 1 / time.
-    scale : float
-        Height of a pulse, or factor of the values of a file.
-    on : {"layer", "floor"}
-        What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
+    signal, at, omega : str, float, float
+        A force, or a motion of the floor, that comes on the way: "pulse", or a file as in [perturb]; when it begins;
+        and at which angular frequency the spectrum of a pulse peaks.
+    scale, on : float, {"layer", "floor"}
+        Height of a pulse, or factor of the values of a file: of the force on each disk of the upper layer along x, or
+        of the velocity of the floor.
     """
 
     TAKES: ClassVar = {None: "", "pulse": "at! omega! scale on", "file": "at! scale on"}

@@ -15,13 +15,8 @@
     [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.command_sections`)
 
 packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
-the feature. A command reads only some sections, and requires some of those
-(:mod:`faultgouge.pywrap.scenes.command_sections`). The user chooses the units: k_n and k_t are force /
-length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
-Defaults are the values of the paper if it gives them; the docstrings say where it does not.
-
-Numbers that no packing can bear are refused: overlaps beyond the contact law, forces near the rounding of the
-coordinates.
+the feature. The user chooses the units: k_n and k_t are force / length^law.exponent, 3/2 by default. The units of the
+paper are the mass of a disk and the diameter of a small disk. Numbers that no packing can bear are refused.
 """
 
 from __future__ import annotations
@@ -121,8 +116,9 @@ class Scene(Section):
     @field_validator("ramp", mode="before")
     @classmethod
     def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
-        lacks_step = isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data
-        return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS} if lacks_step else ramp  # type: ignore[dict-item]
+        if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
+            return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS}
+        return ramp
 
     _inertia: Inertia = PrivateAttr(Inertia())
 
@@ -202,7 +198,7 @@ class Scene(Section):
     def from_mapping(
         cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None, name: str = "scene"
     ) -> Scene:
-        """Make a scene from a mapping with the contents of a TOML file.
+        """Make a scene from a mapping with the contents of a TOML file; errors as those of `from_toml`.
 
         Parameters
         ----------
@@ -210,15 +206,8 @@ class Scene(Section):
             Sections by name, keys and values in them as in TOML; `resolved` gives such a mapping.
         folder : str or Path
             The folder to which a relative packing.file refers.
-        command : str, optional
-            As in `from_toml`.
-        name : str
-            What errors call the scene.
-
-        Raises
-        ------
-        SceneError
-            If the mapping does not describe a scene that can be run.
+        command, name : str, optional
+            As in `from_toml`, and what errors call the scene.
         """
         if not isinstance(mapping, Mapping):
             raise SceneError(f"{name}: a scene maps the names of sections to their keys: give a dict.")
@@ -267,10 +256,10 @@ class Scene(Section):
         return {key: hashlib.sha256(text).hexdigest() for key, text in texts.items()}
 
     def resolved(self) -> dict[str, Any]:
-        """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.
+        """Every key with its value, defaults included, as plain numbers, strings, lists and dicts; without what is
+        None.
 
-        k_t is a number and packing.file an absolute path. What is None is left out, so that
-        `Scene.from_mapping(scene.resolved())` equals the scene.
+        `Scene.from_mapping(scene.resolved())` equals the scene: k_t is a number and packing.file an absolute path.
         """
         sections: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
         inertia = self._inertia.model_dump(exclude_defaults=True)
@@ -281,18 +270,7 @@ SECTIONS = {name: models for name, field in Scene.model_fields.items() if (model
 
 
 def scene_of(scene: object, command: str) -> Scene:
-    """The scene that a function is given, or the scene of a file.
-
-    Parameters
-    ----------
-    command : str
-        The function, which reads of a file what the command of its name reads.
-
-    Raises
-    ------
-    SceneError
-        If it is neither a scene nor the path of one, or the file describes none.
-    """
+    """The scene that a function is given, or that of a file, of which it reads what the command of its name reads."""
     if isinstance(scene, Scene):
         return scene
     if isinstance(scene, (str, Path)):

@@ -1,7 +1,4 @@
-"""The sections of a scene beside [packing], [perturb] and [drive]: their keys, units and defaults.
-
-Defaults are the values of the paper if it gives them; the docstrings say where it does not.
-"""
+"""The sections of a scene beside [packing], [perturb] and [drive]; defaults are the paper's values if it gives them."""
 
 import re
 from itertools import pairwise
@@ -46,20 +43,18 @@ class Law(Section):
 
     Attributes
     ----------
-    kn : float
-        Normal stiffness, force / length^exponent.
-    kt : float
-        Tangential stiffness, force / length^exponent. A scene may also say "A/B kn", "A kn" or "kn". The
-        default, "2/7 kn", is the paper's.
+    kn, kt : float
+        Normal and tangential stiffness, force / length^exponent. A scene may also say "A/B kn", "A kn" or "kn" for kt;
+        the default, "2/7 kn", is the paper's.
     mu : float or tuple of float
-        Static friction coefficient; 0 means no tangential force at all. Of a list, `onset` and
-        `reproduce` take every one and all else the first.
+        Static friction coefficient; 0 means no tangential force at all. Of a list, `onset` and `reproduce` take every
+        one and all else the first.
     exponent : float
         p of the repulsion kn overlap^p: 1.5 (Hertz, the paper's) or 1 (harmonic disks).
     history : {"total", "rescaled", "coulomb"}
-        What contacts remember: the whole slip, as in the paper, or the slip rescaled while overlaps grow, which creates
-        no energy, or the force of a spring behind Coulomb's slider: the law of Cundall and Strack, without the paper's
-        smoothing, which creates no energy either (:mod:`~faultgouge.analysis.packing.law`).
+        What contacts remember: the whole slip, as in the paper; the slip rescaled while overlaps grow, which creates no
+        energy; or the force of a spring behind Coulomb's slider, the law of Cundall and Strack
+        (:mod:`~faultgouge.analysis.packing.law`).
     """
 
     kn: Annotated[Positive, STIFFNESS]
@@ -102,12 +97,8 @@ class Law(Section):
 class Damping(Section):
     """[damping] of dynamics; none in a scene without this section. Equilibria do not depend on it.
 
-    Attributes
-    ----------
-    cn, ct : float
-        Dashpots at the contacts, normal and tangential, force time / length^exponent.
-    tau : float or None
-        Time of the drag -(m/tau) v and -(I/tau) omega on every disk, the paper's damping. None: no drag.
+    Dashpots cn and ct at the contacts, force time / length^exponent; tau, the time of the drag -(m/tau) v and -(I/tau)
+    omega on every disk, which is the paper's damping. None: no drag.
     """
 
     cn: Annotated[NotNegative, DASHPOT] = 0.0
@@ -121,13 +112,7 @@ class Damping(Section):
 
 
 class Load(Section):
-    """[load] on the upper layer.
-
-    Attributes
-    ----------
-    fy : float
-        Force F_y on each disk of the upper layer, downwards.
-    """
+    """[load] on the upper layer: the force F_y on each of its disks, downwards."""
 
     fy: Annotated[Positive, FORCE]
 
@@ -135,13 +120,8 @@ class Load(Section):
 class Relax(Section):
     """[relax] damped dynamics, v = F / damping, of the ramp's method "overdamped".
 
-    Attributes
-    ----------
-    damping : float
-        Friction against the medium, mass / time. It sets the unit of the relaxation's time and leaves the
-        equilibria as they are; the paper gives none.
-    time_step : float or None
-        Step, time. None: a third of the stable step of a disk whose contacts carry ten times F_y.
+    damping, mass / time, sets the unit of the relaxation's time and leaves the equilibria as they are; the paper gives
+    none. time_step is by default a third of the stable step of a disk whose contacts carry ten times F_y.
     """
 
     damping: Annotated[Positive, VISCOSITY] = 1.0
@@ -154,15 +134,14 @@ class Ramp(Section):
     Attributes
     ----------
     step : float
-        Size of the increments of F_x. A scene may leave it out: a 30,000th of F_y, the paper's 1e-4 of 3.
+        Size of the increments of F_x; by default a 30,000th of F_y, the paper's 1e-4 of 3.
     until : float or tuple of float
-        Last F_x; or turning points, to which F_x goes one after the other, up, down and below zero. `onset` seeks on
-        the way to the first one.
+        Last F_x; or turning points, to which F_x goes one after the other. `onset` seeks on the way to the first one.
     method : {"newton", "overdamped"}
         How each equilibrium is found. The paper's is overdamped dynamics.
     force_tolerance : float or None
-        Largest net force, and torque over radius, on a disk of an equilibrium, the paper's f_min; a force in
-        the scene's units. None: what the rounding of the coordinates allows.
+        Largest net force, and torque over radius, on a disk of an equilibrium, the paper's f_min. None: what the
+        rounding of the coordinates allows.
     """
 
     step: Annotated[Positive, FORCE]
@@ -244,12 +223,8 @@ class Friction(Section):
 class Output(Section):
     """[output] beside run.h5.
 
-    Attributes
-    ----------
-    trajectory : bool or None
-        Whether undamped runs store the positions at every sample; None: a film's worth of them, in a small packing.
-    dumps : bool
-        Whether LAMMPS writes its own per-disk and per-contact dumps.
+    trajectory: whether undamped runs store the positions at every sample; None: a film's worth of them, in a small
+    packing. dumps: whether LAMMPS writes its own per-disk and per-contact dumps.
     """
 
     trajectory: bool | None = None

@@ -25,17 +25,15 @@ velocity A/omega.
 
 **Dissipation.** The restitution e of two smallest grains that collide head on at a given velocity follows from
 :math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; the restitution falls as the velocity
-grows (N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity. The ratio
-:math:`Q = \omega/2|\mathrm{Re}\,s|` is the quality factor of a motion :math:`e^{st}`.
+grows (N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitution needs a velocity.
 
 **Quantities.** A scene with a section [units] may give each of its numbers as a text with a unit, which its key
 converts to the scene's own units and rounds to twelve digits, so that two scenes that say the same in other units have
 the same numbers. A stress on the layer ("10 MPa") is a force on each disk of the upper layer. A frequency in hertz is
-the angular frequency, 2 pi times that.
-
-If radii have units, the unit of length is the diameter of the smallest disks. If law.kn is left out, or is a text, it
-is the stiffness that fixes the unit of time: 2e5 where the smallest disks have diameter and mass one, as in the paper.
-If load.fy is left out, it is the overburden on the area of a disk of the upper layer.
+the angular frequency, 2 pi times that. If radii have units, the unit of length is the diameter of the smallest disks.
+If law.kn is left out, or is a text, it is the stiffness that fixes the unit of time: 2e5 where the smallest disks have
+diameter and mass one, as in the paper. If load.fy is left out, it is the overburden on the area of a disk of the upper
+layer.
 """
 
 from __future__ import annotations
@@ -68,19 +66,13 @@ class Units(Section):
     Attributes
     ----------
     grain_diameter : str
-        Diameter of the smallest disks.
-    density : str
-        Of the grains' material.
-    youngs_modulus : str
-        Of the grains' material, and of the rock about the layer.
-    poisson_ratio : float
-        Of both.
+        Of the smallest disks.
+    density, youngs_modulus, poisson_ratio : str, str, float
+        Of the grains' material; the latter two also of the rock about the layer.
     overburden : str or None
         Normal stress on the layer; None: whatever the scene has.
-    restitution : float or None
-        Of two grains that meet head on at `impact_velocity`; None: not known.
-    impact_velocity : str or None
-        At which the restitution is meant.
+    restitution, impact_velocity : float, str, or None
+        Of two grains that meet head on at this velocity; None: not known.
     """
 
     grain_diameter: str
@@ -127,10 +119,8 @@ class RealUnits:
 
     Attributes
     ----------
-    length, mass, time : float
-        Metres, kilograms and seconds in one unit of the scene.
-    area : float
-        Area of the layer per disk of the upper layer, m^2.
+    length, mass, time, area : float
+        Metres, kilograms and seconds in one unit of the scene; area of the layer per disk of the upper layer, m^2.
     shear_modulus, density : float
         Of the rock, Pa and kg/m^3.
     kn, fy : float
@@ -215,11 +205,6 @@ def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, 
     """A scene as TOML contains it, with what its grains fix: k_n and F_y, where these are left out, and the mass.
 
     The units are in the context from then on, in which keys convert their texts.
-
-    Raises
-    ------
-    ValidationError, PydanticCustomError
-        If [units] or [packing] is refused, or a quantity disagrees with the grains.
     """
     grains = Grains.model_validate(scene, context=context)
     units, section, packing = grains.units, grains.packing, dict(scene["packing"])
@@ -228,9 +213,8 @@ def in_units(scene: Mapping[str, Any], context: dict[str, Any]) -> Mapping[str, 
         return scene  # which is refused
     if isinstance(section, GeneratedPacking):
         smallest = 2 * min(section.radii) * context["units"].length
-        says = f'units.grain_diameter = "{units.grain_diameter}" is their diameter: make them agree'
-        other = abs(smallest / units.si("grain_diameter") - 1) > 1e-9
-        refuse(other, "packing.radii", f"has smallest disks of {smallest:.6g} m, and {says}")
+        says = f'has smallest disks of {smallest:.6g} m, and units.grain_diameter = "{units.grain_diameter}" is another'
+        refuse(abs(smallest / units.si("grain_diameter") - 1) > 1e-9, "packing.radii", f"{says}: make them agree")
         if isinstance(packing.get("mass"), str):
             _agree("packing.mass", packing["mass"], "kg", units.grain_mass, "the mass of a smallest grain")
             packing["mass"], section = 1.0, section.model_copy(update={"mass": 1.0})
@@ -255,11 +239,8 @@ def _agree(key: str, text: str, unit: str, grains: float, what: str) -> None:
 def real_units(scene: Any) -> RealUnits | None:
     """The units of a `Scene`; None without a section [units].
 
-    Raises
-    ------
-    PydanticCustomError
-        While the scene is checked: if its layer has no width, if its law is not Hertz's, or if the given overburden
-        differs from the overburden of the scene's F_y.
+    Refused, while the scene is checked, if the layer has no width, if the law is not Hertz's, or if the overburden
+    differs from that of F_y.
     """
     if (units := scene.units) is None:
         return None

@@ -69,9 +69,9 @@ def grow(packing: Packing, draw: int) -> dict[str, Any]:
     with Engine(packing, MPI.COMM_SELF) as engine:
         shake_disks(engine, packing, SEED, draw)
         with engine.undamped(dt) as dynamics:
-            while dynamics.steps * dt < TIME and (not squares or squares[-1] < TO):
+            while engine.steps * dt < TIME and (not squares or squares[-1] < TO):
                 dynamics.advance(steps)
-                times.append(dynamics.steps * dt)
+                times.append(engine.steps * dt)
                 squares.append(distance_of_bearing_disks(packing, engine.packing))
     return growth_of_course(times, squares)
 

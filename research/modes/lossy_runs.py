@@ -79,7 +79,7 @@ def measure_growth(packing: Packing, rate: complex) -> float | None:
         with engine.undamped(dt) as dynamics:
             for _ in range(int(LONGEST / (2 * rate.real * steps * dt))):
                 dynamics.advance(steps)
-                times.append(dynamics.steps * dt)
+                times.append(engine.steps * dt)
                 squares.append(distance_of_bearing_disks(packing, engine.packing))
                 if squares[-1] > TO:
                     break

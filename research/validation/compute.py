@@ -156,13 +156,11 @@ def circle(packing: Configuration, loss: float) -> dict[str, float]:
     return {"loss": loss, "turning": len(turning), "overdamped": len(s) - len(turning), "off": float(off.max())}
 
 
-def circles() -> list[dict[str, Any]]:
-    """Of the disks of `ishima` with Hertz's and Mindlin's contacts, loaded and not."""
-    lmp = disks_at_rest()
+def circles(lmp: Any) -> list[dict[str, Any]]:
+    """Of `disks_at_rest` with Hertz's and Mindlin's contacts, loaded and not."""
     place = np.array(lmp.gather_atoms("x", 1, 3)).reshape(-1, 3)
     radius = np.where(np.arange(len(place)) % 2, 0.4, 0.56)
     edge = lmp.get_thermo("lx")
-    lmp.close()
     material = Material(1000.0, 0.25, density=1.0)
     box = np.diag([edge, edge, 1.0])
     disks = spheres_of_material(place[:, :2], radius, material, box=box, periodic=[True, True, False])
@@ -237,10 +235,10 @@ def sheared(lmp: Any, strain: float = 1e-7) -> float:
     return (found[0] - found[1]) / (2 * strain)
 
 
-def ishima(shares: tuple[float, ...] = SHARES) -> list[dict[str, Any]]:
-    """G of K over that of LAMMPS, G over the frictionless one, and the bands of rotation, by k_t/k_n."""
+def ishima(lmp: Any, shares: tuple[float, ...] = SHARES) -> list[dict[str, Any]]:
+    """Of `disks_at_rest`: G of K over that of LAMMPS, G over the frictionless one, and the bands of rotation, by
+    k_t/k_n."""
     rows: list[dict[str, Any]] = []
-    lmp = disks_at_rest()
     for share in shares:
         law(lmp, share)
         packing = from_lammps(lmp, prove=False)
@@ -254,7 +252,6 @@ def ishima(shares: tuple[float, ...] = SHARES) -> list[dict[str, Any]]:
         band = int(np.argmin(rotates)) if not rotates.all() else len(rotates)
         rows.append({"share": share, "shear": shear, "over_lammps": shear / measured, "rotating": len(turns),
                      "band": band, "bearing": len(packing) - len(packing.rattlers)})  # fmt: skip
-    lmp.close()
     return rows
 
 

@@ -183,11 +183,11 @@ def raise_load(path: Branch, cn: float, rate: float) -> dict[str, Any]:
     signal = Signal(np.array([0.0, 2 * duration]), np.array([0.0, 2 * last]))
     with Engine(packing) as engine, engine.undamped(dt, signal=signal) as dynamics:
         for look in range(1, looks + 1):
-            steps = int(duration / dt * look / looks) - dynamics.steps
+            steps = int(duration / dt * look / looks) - engine.steps
             if not _advance(dynamics, steps):
                 flows = flows or last * look / looks / fy
                 break
-            now, fx = engine.packing, dynamics.steps * dt * rate * fy
+            now, fx = engine.packing, engine.steps * dt * rate * fy
             slip, before = slip + layer_slip(before, now), now
             if flows is None and abs(slip) > 2 * packing.radius.max():
                 flows = fx / fy

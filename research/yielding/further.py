@@ -88,7 +88,7 @@ def left_alone(start: Equilibrium, cn: float, seed: int) -> dict[str, Any]:
         before = engine.packing
         with engine.undamped(dt) as dynamics:
             for time in range(1, TIME + 1):
-                motion = dynamics.advance(int(time / dt) - dynamics.steps)
+                motion = dynamics.advance(int(time / dt) - engine.steps)
                 now = engine.packing
                 slips.append(slips[-1] + layer_slip(before, now))
                 before = now

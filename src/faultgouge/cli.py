@@ -3,9 +3,8 @@
 Exit codes: 1 for a computation that failed, 2 for bad input; 130 and 143 for signals, see
 :mod:`faultgouge.signal_guard`.
 
-An error on all ranks ends them one by one. After an error on one rank alone, the other ranks would wait for ever. To
-distinguish the two cases, ranks with an error wait for each other: a rank that is alone for `SECONDS_TO_MEET` ends all
-ranks.
+After an error on one rank alone, the other ranks would wait for ever. Ranks with an error therefore wait for each
+other: a rank that is alone for `SECONDS_TO_MEET` ends all ranks.
 """
 
 from __future__ import annotations

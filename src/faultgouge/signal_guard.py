@@ -1,15 +1,13 @@
 """A command works in its own process, and a second process, the guard, ends it: in one sentence, within two seconds.
 
 Python runs the handler of a signal between two Python instructions, and LAMMPS or LAPACK may run for minutes before the
-next; SciPy's `eig` does not even let another thread run. The process that the shell or mpiexec has started therefore
-forks before it imports any heavy package. The child does the work. The guard waits for the child and for signals,
-passes SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and gives the child the time `GRACE` to close files and to end other
-processes. Nothing is lost, because files of results are complete at any moment
-(:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words that the child has left in
-memory shared by both (`keeps`), and exits with 128 plus the number of the signal: 130, 143 or 129. When the guard ends,
-for any reason, the kernel kills the child. If a library (SIGSEGV, SIGABRT, or SIGKILL for lack of memory) or a limit of
-CPU time (SIGXCPU) ends the child, the guard prints a sentence as well; also if a library calls `exit`, with whatever
-code.
+next. The process that the shell or mpiexec has started therefore forks before it imports any heavy package, and the
+child does the work. The guard waits for the child and for signals, passes SIGINT (Ctrl-C), SIGTERM and SIGHUP on, and
+gives the child the time `GRACE` to close files and to end other processes. Nothing is lost, because files of results
+are complete at any moment (:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words
+that the child has left in shared memory (`keeps`), and exits with 128 plus the number of the signal. When the guard
+ends, the kernel kills the child. If a library or a limit of CPU time ends the child, the guard prints a sentence as
+well.
 
 Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
 one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work after them. Only rank 0 prints. Commands

@@ -74,10 +74,8 @@ def _begin(parent: int) -> None:
 
 
 def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint]) -> Generator[Row, None, None]:
-    """The rows of points as they end; closing the generator takes back those that no worker has begun.
-
-    Raises BrokenExecutor if a worker was killed.
-    """
+    """The rows of points as they end, BrokenExecutor if a worker was killed; closing the generator takes back those
+    that no worker has begun."""
     groups: dict[str, list[SweepPoint]] = defaultdict(list)
     for point in points:
         groups[point.settling_key].append(point)

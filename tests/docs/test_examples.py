@@ -1,7 +1,6 @@
 """Each script of docs/examples runs in an empty folder, and its numbers are right."""
 
 import re
-import shutil
 import subprocess
 import sys
 from math import sqrt
@@ -18,17 +17,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def printed(tmp_path):
+def printed(of_script):
     """What a script prints."""
-
-    def run(name, *before):
-        shutil.copy(FOLDER / f"{name}.py", tmp_path)
-        command = [*map(str, before), sys.executable, f"{name}.py"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    return run
+    return lambda name: of_script(f"{name}.py", **{f"{name}.py": (FOLDER / f"{name}.py").read_text()})
 
 
 def number(text, before):
@@ -108,9 +99,11 @@ def test_slip(printed):
 
 
 @pytest.mark.ranks
-def test_two_ranks(printed):
+def test_two_ranks(printed, tmp_path):
     """The same bits on one rank and on two."""
-    one, two = printed("on_two_ranks"), printed("on_two_ranks", *on_ranks(2))
+    command = [*map(str, on_ranks(2)), sys.executable, "on_two_ranks.py"]
+    one = printed("on_two_ranks")
+    two = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=True).stdout
     assert (number(one, ""), number(two, "")) == (1, 2)
     assert one.split(":")[1] == two.split(":")[1]
     assert number(one, "growth rate") > 0

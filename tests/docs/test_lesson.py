@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -20,7 +18,7 @@ def cells():
 
 
 @pytest.mark.long
-def test_cells_compute_what_the_answers_say(faultgouge_here, tmp_path):
+def test_cells_compute_what_the_answers_say(faultgouge_here, of_script, tmp_path):
     facts = """
 import json
 x, y, turn = faultgouge.analysis.normal_modes(rest).right[:, 0].real.reshape(3, 3)
@@ -31,10 +29,8 @@ last = float(np.log10(msd[-1] / msd[len(msd) * 9 // 10]))
 sideways = abs(x).min() / abs(y).max()
 print(json.dumps([len(rest.contacts), abs(rest.contacts.slip).max(), merging, sideways, first, last]))
 """
-    (tmp_path / "lesson.py").write_text("\n".join(["import faultgouge.analysis", *cells()]) + facts)
-    done = subprocess.run([sys.executable, "lesson.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    *printed, last = done.stdout.splitlines()
+    printed = of_script("lesson.py", **{"lesson.py": "\n".join(["import faultgouge.analysis", *cells()]) + facts})
+    *printed, last = printed.splitlines()
     contacts, slip, merging, sideways, first, last_decade = json.loads(last)
     text = "\n".join(printed)
     values = [float(each) for each in re.search(r"at F_x = 0: (.*)", text)[1].split()]

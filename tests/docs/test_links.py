@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -112,16 +111,9 @@ def test_scenes_and_sweeps_of_a_page_are_read(tmp_path, path):
             Scene.from_mapping(({} if "[packing]" in text else base) | read_toml(block, "scene"), tmp_path)
 
 
-def of_script(folder, *words):
-    """What a script in a folder prints; it is to end well."""
-    done = subprocess.run([sys.executable, *words], cwd=folder, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("path", list(with_blocks("python")))
-def test_blocks_of_python_run_one_after_the_other(faultgouge, tmp_path, path):
+def test_blocks_of_python_run_one_after_the_other(faultgouge, tmp_path, of_script, path):
     """In a folder with the run of a scene that erupts, whose files have the names that pages give them."""
     text = path.read_text()
     for name, block in ({"scene.toml": toml(SMALL)} | files(path)).items():
@@ -130,12 +122,11 @@ def test_blocks_of_python_run_one_after_the_other(faultgouge, tmp_path, path):
     if 'RunFile("drive.h5")' in text:
         faultgouge("drive", ROOT / "scenes" / "drive.toml", "-o", "drive.h5")
     script = re.findall(r"^```python\n(?!# [\w.]+\n)(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    (tmp_path / "blocks.py").write_text("\n".join(script))
-    of_script(tmp_path, "blocks.py")
+    of_script("blocks.py", **{"blocks.py": "\n".join(script)})
 
 
 @pytest.mark.slow
-def test_the_readme_runs_in_an_empty_folder(tmp_path, faultgouge_here):
+def test_the_readme_runs_in_an_empty_folder(faultgouge_here, of_script):
     readme = (ROOT / "README.md").read_text()
     faultgouge_here("examples", "pour")
     verdict = re.search(r"^\$ faultgouge stability pour.in\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)[1]
@@ -144,13 +135,12 @@ def test_the_readme_runs_in_an_empty_folder(tmp_path, faultgouge_here):
     printed = faultgouge_here("stability", "pour.in").stdout
     assert re.sub(r"[\d.e-]+", "1", printed) == re.sub(r"[\d.e-]+", "1", verdict)
     [(name, text)] = [each for each in files(ROOT / "README.md").items() if each[0].endswith(".py")]
-    (tmp_path / name).write_text(text)
-    assert "F_x = 0.016 " in of_script(tmp_path, name)
+    assert "F_x = 0.016 " in of_script(name, **{name: text})
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({path.name for path in (ROOT / "scenes" / "examples").iterdir()} - {"pour.in"}))
-def test_examples_run(tmp_path, faultgouge_here, name):
+def test_examples_run(tmp_path, faultgouge_here, of_script, name):
     """Each example of the shelf, by the command that it names; that of the README runs there."""
     *_, said = faultgouge_here("examples", name).stdout.splitlines()
     assert (tmp_path / name).exists()
@@ -159,7 +149,7 @@ def test_examples_run(tmp_path, faultgouge_here, name):
         if first == "faultgouge":
             faultgouge_here(*words, *(["--workers", "1"] if words[0] == "sweep" else []))
         else:
-            of_script(tmp_path, *words)
+            of_script(*words)
 
 
 def test_no_output_is_stored():

@@ -1,44 +1,36 @@
 """The page about LAMMPSes of one's own: its script runs, and finds what the page says."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
+from docs.run_page import files
+
 PAGE = Path(__file__).parents[2] / "docs" / "howto_own_lammps.md"
 
 
 @pytest.mark.slow
-def test_script_of_the_page(tmp_path):
-    text = PAGE.read_text()
-    blocks = dict(re.findall(r"^```\w+\n# ([\w.]+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+def test_script_of_the_page(of_script):
+    text, blocks = PAGE.read_text(), files(PAGE)
     assert blocks.keys() == {"slope.in", "look.py", "heap.in", "heap.py", "strain.py"}
-    for name, block in blocks.items():
-        (tmp_path / name).write_text(block)
-    first = re.search(r"^(?: {4}.*\n|\n)+", text[text.index("    import ") :])[0]
-    with (tmp_path / "look.py").open("a") as script:  # the three lines at the top of the page
-        script.write(dedent(first))
-    done = subprocess.run([sys.executable, "look.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    assert "40 spheres" in done.stdout
-    assert "LAMMPS moves as K and C say: True True" in done.stdout
-    assert "<Spectrum: no motion grows" in done.stdout
-    assert "stable: every motion decays, the slowest with D as exp(-0.0523" in done.stdout
-    assert "without dissipation: 42 complex pairs, D as exp(0.318" in done.stdout
-    assert "K alone has 42 complex pairs, D as exp(0.318" in done.stdout
+    first = re.search(r"^(?: {4}.*\n|\n)+", text[text.index("    import ") :])[0]  # the three lines at the top
+    printed = of_script("look.py", **blocks | {"look.py": blocks["look.py"] + dedent(first)})
+    for says in (
+        "40 spheres",
+        "LAMMPS moves as K and C say: True True",
+        "<Spectrum: no motion grows",
+        "stable: every motion decays, the slowest with D as exp(-0.0523",
+        "without dissipation: 42 complex pairs, D as exp(0.318",
+        "K alone has 42 complex pairs, D as exp(0.318",
+    ):
+        assert says in printed
 
 
 @pytest.mark.long
-def test_heap_of_the_page(tmp_path):
-    text = PAGE.read_text()
-    blocks = dict(re.findall(r"^```\w+\n# (heap[.\w]+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
-    for name, block in blocks.items():
-        (tmp_path / name).write_text(block)
-    done = subprocess.run([sys.executable, "heap.py"], cwd=tmp_path, capture_output=True, text=True, timeout=3600)
-    assert done.returncode == 0, done.stderr
-    first, rests, flows = (float(each) for each in re.findall(r"([\d.]+)(?= degrees|$)", done.stdout, re.MULTILINE)[:3])
+def test_heap_of_the_page(of_script):
+    printed = of_script("heap.py", **files(PAGE))
+    first, rests, flows = (float(each) for each in re.findall(r"([\d.]+)(?= degrees|$)", printed, re.MULTILINE)[:3])
     assert 0.01 < first < 1.0  # other builds pour another heap
     assert 15.0 < rests < flows < 27.0

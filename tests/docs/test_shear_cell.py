@@ -1,8 +1,6 @@
 """The page about a shear cell: its script runs, and what stability says is what LAMMPS does."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +12,11 @@ PAGE = Path(__file__).parents[2] / "docs" / "howto_shear_cell.md"
 
 
 @pytest.mark.long
-def test_script_of_the_page(tmp_path):
+def test_script_of_the_page(of_script):
     """Other builds pour another bed: what agrees in one agrees in another."""
-    for name, text in files(PAGE).items():
-        (tmp_path / name).write_text(text)
-    done = subprocess.run([sys.executable, "cycle.py"], cwd=tmp_path, capture_output=True, text=True, timeout=1800)
-    assert done.returncode == 0, done.stderr
+    printed = of_script("cycle.py", **files(PAGE))
     shown = re.findall(r"^```text\n(?!# )(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)[0]
-    for text in (done.stdout, shown):
+    for text in (printed, shown):
         first, *_, last = (float(each) for each in re.findall(r"^path: .* force (\S+)$", text, re.MULTILINE))
         assert 0 < last - first < 5.0 * 0.04  # the lid gives way a little
         ours, theirs = (float(each) for each in re.findall(r"^drift (\S+); of LAMMPS (\S+)$", text, re.MULTILINE)[0])

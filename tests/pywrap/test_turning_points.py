@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from reference_layer import toml
 from table_rows import rows_of
 
 from faultgouge.analysis import RunFile
@@ -14,20 +15,11 @@ from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind, ramp_loads
 from faultgouge.pywrap.scenes.sections import Ramp
 
-SCENE = """
-[packing]
-disks = 12
-width = 4.1
-seed = 3
-[law]
-kn = 2e5
-mu = {mu}
-[load]
-fy = 3.0
-[ramp]
-step = 0.1
-until = {until}
-"""
+SCENE = {"packing": {"disks": 12, "width": 4.1, "seed": 3}, "law": {"kn": 2e5, "mu": 0.3}, "load": {"fy": 3.0}}
+
+
+def cycle(until):
+    return toml(SCENE | {"ramp": {"step": 0.1, "until": until}})
 
 
 def way(step, until):
@@ -77,16 +69,13 @@ def test_loads_that_make_no_sense_are_refused(sections, says, refused_scene):
 
 @pytest.mark.slow
 def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_here):
-    (tmp_path / "scene.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.5, 0.5]))
-    done = faultgouge_here("ramp", "scene.toml", "-o", "cycle.h5", "--json")
-    left = json.loads(done.stdout)["hysteresis"]
-    (tmp_path / "short.toml").write_text(SCENE.format(mu=0.3, until=[0.5, -0.2]))
+    (tmp_path / "scene.toml").write_text(cycle([0.5, -0.5, 0.5]))
+    (tmp_path / "short.toml").write_text(cycle([0.5, -0.2]))
+    left = json.loads(faultgouge_here("ramp", "scene.toml", "-o", "cycle.h5", "--json").stdout)["hysteresis"]
     faultgouge_here("ramp", "short.toml", "-o", "parts.h5")
-    said = faultgouge_here("ramp", "scene.toml", "-o", "parts.h5").stdout
-    assert "F_x is back at 0.5" in said
-    with RunFile(tmp_path / "cycle.h5") as one, RunFile(tmp_path / "parts.h5") as other:
-        packings = [one.packing(k) for k in range(len(one))]
-        assert packings == [other.packing(k) for k in range(len(other))]
+    assert "F_x is back at 0.5" in faultgouge_here("ramp", "scene.toml", "-o", "parts.h5").stdout
+    packings, parts = packings_of(tmp_path / "cycle.h5"), packings_of(tmp_path / "parts.h5")
+    assert packings == parts
     assert turning_points(np.array([each.fx for each in packings])) == [5, 15]
     found = hysteresis(packings)
     assert left == {"fx": 0.5, "begin": 5, "remaining": found.remaining, "work": found.work, "closes": False}
@@ -102,23 +91,24 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_her
     moved = layer_displacement(packings)[:, 0]
     assert found.remaining == moved[-1] - moved[5]
     # a view of three loads has both turning points, too
-    for command, says in (
-        ("view cycle.h5 --loads 3 -o cycle.html", "5 packings, "),
-        ("export cycle.h5 --frames all -o cycle.xyz", "26 frames of equilibria"),
-    ):
-        assert faultgouge_here(*command.split()).stdout.startswith(says)
+    assert faultgouge_here("view", "cycle.h5", "--loads", "3", "-o", "cycle.html").stdout.startswith("5 packings, ")
     assert "displacement of the upper layer" in (tmp_path / "cycle.html").read_text()
-    heads = (tmp_path / "cycle.xyz").read_text().splitlines()[1 :: len(packings[0]) + 2]
+    faultgouge_here("export", "cycle.h5", "--frames", "all", "-o", "cycle.xyz")
+    heads = (tmp_path / "cycle.xyz").read_text().splitlines()[1 :: len(top) + 2]
     assert [float(re.search(r" fx=(\S+)", head)[1]) for head in heads] == [each.fx for each in packings]
+
+
+def packings_of(path):
+    with RunFile(path) as file:
+        return [file.packing(k) for k in range(len(file))]
 
 
 @pytest.mark.slow
 def test_a_small_cycle_closes(tmp_path, faultgouge_here):
     """No contact slides for good: what remains is 1e-12 of how far the layer has moved, and no work."""
-    (tmp_path / "scene.toml").write_text(SCENE.format(mu=0.3, until=[0.1, 0.0]))
+    (tmp_path / "scene.toml").write_text(cycle([0.1, 0.0]))
     said = faultgouge_here("ramp", "scene.toml").stdout
     assert "F_x is back at 0, and so is the upper layer: the path closes, to rounding" in said
-    with RunFile(tmp_path / "run.h5") as file:
-        found = hysteresis([file.packing(k) for k in range(len(file))])
+    found = hysteresis(packings_of(tmp_path / "run.h5"))
     assert found.closes
     assert abs(found.work) < 1e-9 * 0.1 * 3e-4  # of F_x times the displacement

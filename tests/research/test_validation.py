@@ -31,27 +31,15 @@ def test_lattice_dynamics_of_the_crystal_in_lammps():
     assert all(each["difference"] < 3e-12 for each in FOUND["lattice"])
 
 
-def sentences_hold(rows):
-    for row in rows:
+def test_sentences_of_ishima():
+    for row in FOUND["ishima"]:
         # K of LAMMPS's forces at k_t = 1e-4 k_n is small beside the rounding of a slip that began at zero
         assert row["over_lammps"] == pytest.approx(1, abs=2e-5 if row["share"] == 1e-4 else 1e-6)
-    frictionless, *others = rows
-    weak = [row for row in others if row["share"] <= 1e-3]
-    for row in weak:
+    frictionless, *others = FOUND["ishima"]
+    for row in (each for each in others if each["share"] <= 1e-3):
         assert row["shear"] / frictionless["shear"] - 1 == pytest.approx(28 * row["share"], rel=0.1)
         assert row["band"] == row["rotating"] == row["bearing"]
-
-
-def test_sentences_of_ishima():
-    sentences_hold(FOUND["ishima"])
-    assert FOUND["ishima"][-1]["band"] == 0
-
-
-@pytest.mark.slow
-def test_shear_of_ishima_in_lammps():
-    (again,) = compute.ishima((1e-3,))
-    assert again["over_lammps"] == pytest.approx(1, abs=1e-6)
-    assert again["shear"] == pytest.approx(FOUND["ishima"][2]["shear"], rel=1e-6)
+    assert others[-1]["band"] == 0
 
 
 def test_circle_of_hu():
@@ -61,9 +49,15 @@ def test_circle_of_hu():
 
 
 @pytest.mark.slow
-def test_circle_of_hu_again():
-    for row, stored in zip(compute.circles(), FOUND["circles"], strict=True):
+def test_circles_and_shear_of_disks_in_lammps_again():
+    """One packing for both: it comes to rest in LAMMPS in two seconds."""
+    disks = compute.disks_at_rest()
+    for row, stored in zip(compute.circles(disks), FOUND["circles"], strict=True):
         assert row == pytest.approx(stored, rel=1e-3, abs=1e-13)
+    (again,) = compute.ishima(disks, (1e-3,))
+    disks.close()
+    assert again["over_lammps"] == pytest.approx(1, abs=1e-6)
+    assert again["shear"] == pytest.approx(FOUND["ishima"][2]["shear"], rel=1e-6)
 
 
 def test_the_rule_of_osullivan_and_bray_is_safe():

@@ -15,30 +15,28 @@ from research.modes.sets import sets
 
 SCENE = SMALL | {
     "packing": {"disks": 60, "width": 9.2, "seed": 77},
-    "ramp": {"step": 0.03, "until": 0.9},
-    "modes": {"fx_over_fy": [0.02, 0.1, 0.2]},
+    "ramp": {"step": 0.03, "until": 20.0},
+    "modes": {"fx_over_fy": [0.1, 0.2, 5.0]},
 }
 
 
-@pytest.fixture(scope="module")
-def loaded():
-    """Packings of 60 disks at three loads."""
-    state, found = settle(Scene.from_mapping(SCENE)), []
+def at_loads(scene, *loads):
+    """The packings of a scene in equilibrium at increasing loads."""
+    state, found = settle(scene), []
     with Engine(state.packing) as engine:
-        for fx in (0.06, 0.3, 0.6):
+        for fx in loads:
             state = equilibrate(engine, state, fx=fx)
             found.append(state.packing)
     return found
 
 
-def test_counts_and_bounds_are_those_of_numpy(loaded):
-    for packing in loaded:
+def test_counts_and_bounds_are_those_of_numpy():
+    for packing in at_loads(Scene.from_mapping(SCENE), 0.06, 0.3, 0.6):
         found = count_pairs(packing)
         mass = np.tile(packing.mass, 3)  # the inertia factor is 1
         dense = stiffness_matrix(packing).toarray() / np.sqrt(mass[:, None] * mass)
         plain = np.linalg.eigvals(dense[np.ix_(*[np.flatnonzero(dense.any(axis=1))] * 2)])
-        assert len(found.omega) == np.count_nonzero(plain.imag > 0)
-        assert found.modes == len(plain)
+        assert (len(found.omega), found.modes) == (np.count_nonzero(plain.imag > 0), len(plain))
         # the least Q is that of a pair far from coalescing: two orders of the coordinates give ten digits
         assert (found.as_dict()["least_q"] or np.inf) == pytest.approx(spectrum(packing).least_q, rel=1e-9)
         bound = antisymmetric_norm(packing)
@@ -56,20 +54,21 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
     found = count_pairs(column).as_dict()
     assert (found["pairs"], found["negative"]) == (0, 1)
     assert found["growth_rate"] == pytest.approx(spectrum(column).growth_rate(), rel=1e-9)
-    # the ramp has come to the first load of the scene, 0.02 F_y
-    there = Equilibrium(replace(column, fx=0.02 * 3.0), 0.0, 1e-11, 1)
+    # the ramp has come to the first load of the scene, 0.1 F_y
+    there = Equilibrium(replace(column, fx=0.1 * 3.0), 0.0, 1e-11, 1)
     row = modes.row(Scene.from_mapping(SCENE), lambda mu: there)
     assert (row["ends"], row["loads"]) == ("turning point", [])
 
 
 @pytest.mark.slow
 def test_the_command_leaves_rows_and_pictures_up_to_the_last_equilibrium(faultgouge_here, tmp_path):
-    scene = SCENE | {"modes": {"fx_over_fy": [0.1, 0.2, 5.0]}, "ramp": {"step": 0.03, "until": 20.0}}
+    """Of thirty disks, whose branch ends where the third load is not reached."""
+    scene = SCENE | {"packing": {"disks": 30, "top": 5, "width": 6.0, "seed": 3}}
     (tmp_path / "scene.toml").write_text(toml(scene))
     said = faultgouge_here("modes", "scene.toml", "-o", "out", "--workers", "1").stdout
     assert "there is no equilibrium at the next load" in said
     rows = json.loads((tmp_path / "out/modes.json").read_text())["rows"]
-    assert [(row["fx_over_fy"], row["disks"], row["seed"]) for row in rows] == [(0.1, 60, 77), (0.2, 60, 77)]
+    assert [(row["fx_over_fy"], row["disks"], row["seed"]) for row in rows] == [(0.1, 30, 3), (0.2, 30, 3)]
     with (tmp_path / "out/modes.csv").open() as file:
         assert [int(row["pairs"]) for row in csv.DictReader(file)] == [row["pairs"] for row in rows]
     assert (tmp_path / "out" / "modes.png").stat().st_size > 10_000
@@ -89,9 +88,7 @@ def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
 @pytest.mark.long  # ten seconds of LAPACK
 def test_pairs_of_a_large_packing_are_those_of_lapack():
     scene = Scene.from_mapping(SMALL | {"packing": {"disks": 700, "width": 31.5, "seed": 1}})
-    rest = settle(scene)
-    with Engine(rest.packing) as engine:
-        packing = equilibrate(engine, equilibrate(engine, rest, fx=0.03), fx=0.06).packing
+    *_, packing = at_loads(scene, 0.03, 0.06)
     found, every = count_pairs(packing), PairCounts.of(eigenvalues(packing))
     assert packing.coordinates > 2000
     assert (found.modes, len(found.omega)) == (every.modes, len(every.omega))

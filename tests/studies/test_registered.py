@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,29 +16,18 @@ from faultgouge.pywrap import Scene, SceneError
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def strong(tmp_path, monkeypatch):
-    """The file of the page among the studies."""
-    page = (ROOT / "docs" / "howto.md").read_text()
-    (text,) = re.findall(r"```py\n(\"\"\"How many contacts.*?)```", page, re.DOTALL)
-    folder = tmp_path / "studies"
+def test_the_study_of_the_page_is_a_command_and_a_section(tmp_path, monkeypatch, faultgouge_here):
+    (text,) = re.findall(r"```py\n(\"\"\"How many contacts.*?)```", (ROOT / "docs" / "howto.md").read_text(), re.DOTALL)
+    folder, scene = tmp_path / "studies", SMALL | {"strong": {"share": 0.3}}
     folder.mkdir()
     (folder / "strong.py").write_text(text)
     monkeypatch.setattr(registered, "FOLDER", folder)
     monkeypatch.setattr(faultgouge.studies, "__path__", [*faultgouge.studies.__path__, str(folder)])
-    registered.description.cache_clear()
-    yield folder
-    registered.description.cache_clear()
-
-
-def test_the_study_of_the_page_is_a_command_and_a_section(strong, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    strong = program().commands["strong"]
-    assert strong.help.startswith("Count the contacts that carry more than a share of the largest normal force.")
-    scene = SMALL | {"strong": {"share": 0.3}}
+    monkeypatch.setattr(registered, "description", cache(registered.description.__wrapped__))
+    says = program().commands["strong"].help
+    assert says.startswith("Count the contacts that carry more than a share of the largest normal force.")
     (tmp_path / "scene.toml").write_text(toml(scene))
-    program()(["strong", "scene.toml", "-o", "out", "--json"], standalone_mode=False)
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(faultgouge_here("strong", "scene.toml", "-o", "out", "--json").stdout)
     assert printed == json.loads((tmp_path / "out" / "strong.json").read_text())
     assert printed["scene"]["strong"] == {"share": 0.3}
     assert 0 < printed["contacts"] < printed["of"]

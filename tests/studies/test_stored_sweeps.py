@@ -148,35 +148,35 @@ def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(fol
         before = (whole / "results.jsonl").read_text()
         merge([one], whole, id)
         merge([one, two, whole], whole, id)
-        assert (whole / "results.jsonl").read_text() == before
-        assert (one / "results.jsonl").read_text() == half
+        assert ((whole / "results.jsonl").read_text(), (one / "results.jsonl").read_text()) == (before, half)
         assert len((whole / "results.csv").read_text().splitlines()) == 4
-    other = folder / "other"
-    run(folder, "ends", other, "7:9")
-    files = {path: path.read_bytes() for path in other.iterdir()}
-    with pytest.raises(SceneError, match=r"other is of another sweep than .*part1.* \(task differs\)"):
-        merge([one, two], other, id)
-    assert {path: path.read_bytes() for path in other.iterdir()} == files
+    run(folder, "ends", "other", "7:9")
+    files = {path: path.read_bytes() for path in (folder / "other").iterdir()}
+
+    def refused(says, target="new"):
+        with pytest.raises(SceneError, match=says):
+            merge([one, two], folder / target, id)
+
+    refused(r"other is of another sweep than .*part1.* \(task differs\)", "other")
+    assert {path: path.read_bytes() for path in (folder / "other").iterdir()} == files
     monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
     run(folder, "nothing", two, part=(2, 2))
-    with pytest.raises(SceneError, match=r"part2 is of another sweep than .*part1.* \(version differs\)"):
-        merge([one, two], folder / "new", id)
+    refused(r"part2 is of another sweep than .*part1.* \(version differs\)")
     for text in ('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}', "no JSON", "3"):
         (one / "sweep.json").write_text(text)
-        with pytest.raises(SceneError, match=r"part1 is no folder of a sweep, or of version 1\.0\.0 or before"):
-            merge([one, two], folder / "new", id)
+        refused(r"part1 is no folder of a sweep, or of version 1\.0\.0 or before")
     assert not (folder / "new").exists()
 
 
 def test_a_good_row_goes_before_an_error_and_two_results_are_named(folder):
     for name, change in (("good", {}), ("bad", {"says": "out of memory"}), ("other", {"result": {"seed": 5}})):
-        run(folder, "ends", name, "2:3")
-        first, second = (folder / name / "results.jsonl").read_text().splitlines()
-        (folder / name / "results.jsonl").write_text(f"{json.dumps(json.loads(first) | change)}\n{second}\n")
-    for number, names in enumerate((("good", "bad"), ("bad", "good"))):
-        rows = merge([folder / name for name in names], folder / f"whole{number}", id)[1]
+        (first, *_), lines = run(folder, "ends", name, "2:3"), folder / name / "results.jsonl"
+        row, second = lines.read_text().splitlines()
+        lines.write_text(f"{json.dumps(json.loads(row) | change)}\n{second}\n")
+    for names in (("good", "bad"), ("bad", "good")):
+        rows = merge([folder / name for name in names], folder / "-".join(names), id)[1]
         assert [row["result"] for row in rows] == [{"seed": 2}, {"seed": 3}]
-    with pytest.raises(SceneError, match=rf"good/.*jsonl and .*other/.*jsonl have .*seed = 2; key {rows[0]['key']}"):
+    with pytest.raises(SceneError, match=rf"good/.*jsonl and .*other/.*jsonl have .*seed = 2; key {first['key']}"):
         merge([folder / "good", folder / "other"], folder / "whole", id)
     assert not (folder / "whole" / "results.csv").exists()
 

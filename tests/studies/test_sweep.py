@@ -8,6 +8,8 @@ import re
 import signal
 import subprocess
 import time
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -74,8 +76,9 @@ def test_what_settles_alike_and_where_a_seed_is_several_packings(axes, packing, 
 def test_an_overburden_that_varies_is_a_load_that_does():
     sweep = Sweep.from_toml(SWEEPS / "depth.toml")
     assert other_packings(sweep) is None  # settled at one load
-    loads = [point.scene.load.fy for point in sweep.points[::20]]
-    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
+    sweep = replace(sweep, axes=sweep.axes | {"packing.seed": [1]})
+    loads = np.array([point.scene.load.fy for point in sweep.points])
+    assert loads / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
 
 
 @pytest.mark.parametrize(("mapping", "says"), rows_of("studies/refused_sweeps.txt"))
@@ -144,10 +147,10 @@ def test_failures_are_rows_and_merge_tells_what_is_missing(tmp_path):
 def test_the_picture_has_a_curve_for_each_value(tmp_path, monkeypatch):
     drawn, known = [], {mu: np.random.default_rng(1).uniform(0, 0.04, 20) for mu in (0.5, 0.8)}
     rows = [{"values": {}, "result": {"ramps": 3}}]
-    for mu, onsets in known.items():
-        for seed, fx in enumerate(onsets.tolist()):
-            result = {"ends": "onset", "fx_c": fx} if fx < 0.03 else {"ends": "until", "reach": 0.03}
-            rows.append({"values": {"law.mu": mu, "packing.seed": seed}, "result": result})
+    for mu, seed in product(known, range(20)):
+        fx = float(known[mu][seed])
+        result = {"ends": "onset", "fx_c": fx} if fx < 0.03 else {"ends": "until", "reach": 0.03}
+        rows.append({"values": {"law.mu": mu, "packing.seed": seed}, "result": result})
     monkeypatch.setattr("faultgouge.studies.sweep.draw.save", lambda figure, stem: drawn.append(figure))
     assert draw_sweep(rows, tmp_path, print).endswith("results.png")
     (axes,) = drawn[0].axes
@@ -200,12 +203,10 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
     scene, found = SMALL | more | {"eruptions": {"load": [0.02], "time": 1.0}}, {}
     for task in ("trigger", "eruptions"):
         wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene})
-        found[task] = run_sweep(wanted, tmp_path / task, say=id)
-    assert draw_sweep(found["trigger"], tmp_path, print).endswith("results.png")
-    (predicted,), (run,) = found["trigger"][0]["result"]["map"], found["eruptions"][0]["result"]["runs"]
-    assert predicted["predicted"] > 0
-    assert run["fx"] == 0.02
-    assert run["msd"] > 0
+        (row,) = run_sweep(wanted, tmp_path / task, say=id)
+        found[task] = row["result"]
+    assert found["trigger"]["map"][0]["predicted"] > 0
+    assert found["eruptions"]["runs"][0]["fx"] == 0.02
 
 
 def stripped(rows):

@@ -16,18 +16,18 @@ from faultgouge.studies.trigger import bisect_amplitude, predictions, trigger
 from faultgouge.studies.triggering import JUMP_SHARE, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
-
-
-def cut_off(folder, lines, name):
-    """A folder as a kill before the last result leaves it."""
-    cut = folder / "cut"
-    cut.mkdir()
-    (cut / name).write_text("".join(lines.splitlines(keepends=True)[:-1]))
-    return cut
-
-
 WAVES = {"omega": [1.0, 14.0], "time": 4.0, "runs": 2}
 WEAKENS = {"v0": 1e-7, "v_ss": "10 v0"}
+
+
+def after_a_kill(study, scene, folder, result):
+    """A study that is cut off before its last result, and goes on: the whole again, to the bit."""
+    lines = (folder / f"{study.name}.jsonl").read_text().splitlines(keepends=True)
+    cut = folder / "cut"
+    cut.mkdir()
+    (cut / f"{study.name}.jsonl").write_text("".join(lines[:-1]))
+    assert study(scene, cut, say=id) == result
+    return len(lines)
 
 
 @pytest.mark.long
@@ -37,8 +37,8 @@ WEAKENS = {"v0": 1e-7, "v_ss": "10 v0"}
 def test_prediction_is_what_lammps_bisects(tmp_path, damping, fx_c, distances):
     """Distances count from the onset, which normal dashpots alone lower; the wave is damped in K's answer, too."""
     sections = BASE | {"friction": WEAKENS, "trigger": WAVES | {"distance": distances}}
-    scene = Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
-    result = trigger(scene, tmp_path / "out", say=id)
+    scene, out = Scene.from_mapping(sections | ({"damping": damping} if damping else {})), tmp_path / "out"
+    result = trigger(scene, out, say=id)
     assert result["fx_c"] == pytest.approx(fx_c, abs=1e-10)
     runs = [row for row in result["map"] if row["measured"] is not None]
     assert (len(result["map"]), len(runs)) == (2 * len(distances), 2)
@@ -46,13 +46,13 @@ def test_prediction_is_what_lammps_bisects(tmp_path, damping, fx_c, distances):
         assert row["fx"] == pytest.approx((1 - row["distance"]) * result["fx_c"], rel=1e-12)
         assert row["below"] < row["measured"] < row["above"] < 1.011 * row["below"]
         assert row["predicted"] == pytest.approx(row["measured"], rel=0.05)
-    lines = (tmp_path / "out/trigger.jsonl").read_text()
-    assert trigger(scene, tmp_path / "out", say=id) == result
-    assert (tmp_path / "out/trigger.jsonl").read_text() == lines  # nothing was computed again
-    assert trigger(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=id) == result
-    page = " ".join((tmp_path / "out/trigger.md").read_text().split())
+    lines = (out / "trigger.jsonl").read_text()
+    assert trigger(scene, out, say=id) == result
+    assert (out / "trigger.jsonl").read_text() == lines  # nothing was computed again
+    after_a_kill(trigger, scene, out, result)
+    page = " ".join((out / "trigger.md").read_text().split())
     assert ("the onset with the dashpots and the drag" in page) is bool(damping)
-    assert (tmp_path / "out/thresholds.png").stat().st_size > 10_000
+    assert (out / "thresholds.png").stat().st_size > 10_000
 
 
 @pytest.mark.ranks
@@ -101,13 +101,10 @@ def test_a_stable_packing_is_watched_for_a_time_of_its_own_units(units, friction
 
 @pytest.mark.long
 def test_eruptions_that_were_cut_off_are_those_of_one_run(tmp_path):
-    """To the bit, though the loads that are known are not run again."""
+    """Though the loads that are known are not run again."""
     small = {"packing": {"disks": 30, "seed": 4}, "ramp": {"step": 0.02, "until": 0.3}}
     scene = Scene.from_mapping({**BASE, **small, "eruptions": {"load": [0.05, 0.25], "time": 10.0}})
-    whole = eruptions(scene, tmp_path / "whole", say=id)
-    lines = (tmp_path / "whole/eruptions.jsonl").read_text()
-    assert len(lines.splitlines()) == 2
-    assert eruptions(scene, cut_off(tmp_path, lines, "eruptions.jsonl"), say=id) == whole
+    assert after_a_kill(eruptions, scene, tmp_path, eruptions(scene, tmp_path, say=id)) == 2
 
 
 @pytest.mark.ranks
@@ -116,14 +113,13 @@ def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, t
     """Above the onset, 0.0218, D grows, but not to its end in the time that is given; with strong drag nothing does."""
     sections = BASE | {"eruptions": {"load": [0.024], "time": 60.0}, "damping": {"tau": 0.5}}
     (tmp_path / "scene.toml").write_text(toml(sections))
-    scene = Scene.from_mapping(sections)
-    one = eruptions(scene, tmp_path / "one", say=id)
+    one = eruptions(Scene.from_mapping(sections), tmp_path / "one", say=id)
     free, dragged = one["runs"]
     assert (free["damped"], free["ends"]) == (False, "cut off")
     assert (dragged["damped"], dragged["ends"], dragged["rate"]) == (True, "stable", 0.0)
     assert free["rate"] > 0
-    assert "| 0.024 | 0.0361 | 0 |" in (tmp_path / "one/eruptions.md").read_text()
     assert free["balance"] < 1e-2
+    assert "| 0.024 | 0.0361 | 0 |" in (tmp_path / "one/eruptions.md").read_text()
     # rounding alone: 1e-25 after a hundred time units
     assert all(run["noise"] < 1e-25 for run in one["runs"])
     done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)

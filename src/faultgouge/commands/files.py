@@ -31,7 +31,6 @@ from .terminal import (
 OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON; of YADE and MercuryDPM."
 OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
 OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
-OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
 
 
 @command("faultgouge examples pour && faultgouge import pour.in -o packing.h5", writes="new")
@@ -207,7 +206,7 @@ def export(
     file: PackingFile,
     frame: Frame = -1,
     mode: Annotated[str | None, Option("--mode", metavar="pair|N", help="Also a mode, as of `draw`.")] = None,
-    frames: Annotated[str | None, Option("--frames", metavar="all|START:STOP[:STEP]", help=OF_FRAMES)] = None,
+    frames: Annotated[str | None, Option(metavar="all|START:STOP[:STEP]", help="A film; .xyz, .gsd, .pvd.")] = None,
     output: Annotated[Path, Option("-o", "--output", help=".vtp, .pvd, .xyz, .data, .gsd, .csv")] = Path("packing.vtp"),
 ) -> Results:
     """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
@@ -219,7 +218,7 @@ def export(
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
-    from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.analysis import RunFile
     from faultgouge.analysis.files.formats import (
         ModeVectors,
         check_writer,
@@ -235,8 +234,6 @@ def export(
             if mode is not None or frame != -1:
                 raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
             check_writer(output, frames=True)
-            if file.suffix == ".disks":
-                raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
             with RunFile(file) as run:
                 numbers = choose_frames(run, frames)
                 write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))

@@ -73,7 +73,6 @@ def stability(
     state is looked at. Without a file this is the old name of `faultgouge extremes`.
     """
     from faultgouge.door import is_deck
-    from faultgouge.pywrap.granular.run_deck import run_deck
 
     if file is None:
         say("faultgouge stability without a file is called faultgouge extremes now")
@@ -94,6 +93,8 @@ def stability(
     if not is_deck(file):
         judge(follow, stored_packing(refuse_scene(file), frame))
     else:
+        from faultgouge.pywrap.granular.run_deck import run_deck
+
         with status(f"{file}: LAMMPS runs") as show:  # motion is followed while LAMMPS is there
             packing = run_deck(file, relaxes=relax, show=show, use=judge if follow else None)
         if not follow:

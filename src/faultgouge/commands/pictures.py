@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from typer import Argument, Option
@@ -28,8 +28,6 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from matplotlib.figure import Figure
 
     from faultgouge.figures.film import Film
@@ -40,8 +38,7 @@ if TYPE_CHECKING:
 
 OF_MODE = "The unstable pair, or the two modes closest to merging; or mode N, by eigenvalue from 0."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
-OF_COLOUR = "Colour of the contacts: |f_t|/(mu f_n), slip over its limit, f_n, or none."
-WhichColour = Annotated[Literal["mobilised", "slip", "force", "none"], Option(help=OF_COLOUR)]
+WhichColour = Annotated[Literal["mobilised", "slip", "force", "none"], Option(help="|f_t|/(mu f_n), slip/limit, f_n.")]
 
 
 def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:
@@ -161,12 +158,9 @@ def movie(
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.figures.motion_films import Course, RunMotion, film_of_ramp, film_of_run
     from faultgouge.pywrap.runs.drive import SERIES, slips_in
 
-    if file.suffix == ".disks" or holds_configuration(file):
-        raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     with RunFile(file) as run:
         if motion := RunMotion.read(run):
             return film_of_run(motion if span is None else motion.between(*span), count, dots=dots)
@@ -199,11 +193,5 @@ def view(
     """
     from faultgouge.door import view as write_page
 
-    counts: list[int] = []
-
-    def shown(packings: Sequence[Any]) -> Iterable[Any]:
-        counts.append(len(packings))
-        return progress(packings, "loads")
-
-    write_page(file, output, loads, say, shown)
-    yield f"{counted(counts[-1], 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}"
+    page = write_page(file, output, loads, say, lambda packings: progress(packings, "loads"))
+    yield f"{counted(page.packings, 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}"

@@ -59,7 +59,6 @@ def study_command(name: str) -> CommandInfo | None:
     else:
         of_run = "of_run" in about.given
         metavar = "SCENE|SWEEP|drive.h5" if of_run else "SCENE|SWEEP"
-        help_ = f"A scene, a sweep of the task {name}, or a run of `drive`." if of_run else "A scene, or a sweep of it."
 
         def run(  # type: ignore[misc]
             file: Path, output: Folder = Path(name), shard: Shard = "1/1", workers: Workers = None
@@ -72,7 +71,7 @@ def study_command(name: str) -> CommandInfo | None:
                     study = registered.study_of(name)
                     yield from study.of_run(file, output, say, lambda rows, count: progress(rows, "states", count))
 
-        run.__annotations__["file"] = Annotated[Path, Argument(metavar=metavar, help=help_)]
+        run.__annotations__["file"] = Annotated[Path, Argument(metavar=metavar, help="A scene, or a sweep of it.")]
     run.__name__, run.__doc__ = name, about.says
     command(example, **made)(run)
     return COMMANDS.pop(name)

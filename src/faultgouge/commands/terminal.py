@@ -83,23 +83,11 @@ def command(
 ) -> Callable[[Callable[P, Results]], Callable[P, Results]]:
     """Make a function a command: its scene is read, its output is kept from others, and what it yields is printed.
 
-    An error that the function raises is printed in one sentence by :mod:`faultgouge.cli`; `say`, `status`, `working`
-    and `progress` show how far the work is.
-
-    Parameters
-    ----------
-    example : str
-        Of the help.
-    reads : str, optional
-        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
-    writes : {"", "file", "new", "run", "folder"}
-        What the option `output` is, see `locked`.
-    kept : str
-        What an interrupt leaves of the output, in words that name it as {output}.
-    alone : bool
-        Whether rank 0 alone works.
-    as_json : bool
-        Whether the command has the option --json. Lines that follow the document then go to standard error.
+    An error that the function raises is printed in one sentence by :mod:`faultgouge.cli`. The argument `scene`, of type
+    `SceneFile`, is read as the command `reads` reads it, before anything is written. The option `output` is what
+    `locked` calls `writes`, and `kept` says what an interrupt leaves of it, in words that name it as {output}. With
+    `alone` rank 0 alone works. With `as_json` the command has the option --json, and lines that follow the document go
+    to standard error.
     """
 
     def register(work: Callable[P, Results]) -> Callable[P, Results]:
@@ -178,16 +166,14 @@ def stored_packing(file: Path, frame: int = -1, time: float | None = None) -> Pa
     from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.door import load, packing_in
 
-    if file.suffix == ".disks" or holds_configuration(file):
-        if time is None:
-            return load(file, frame)
-    else:
-        with RunFile(file) as run:
-            if time is None:
-                return packing_in(run, frame)
-            if run.attributes.get("task") == "drive":
-                return packing_in(run, int(abs(run.observable("time") - time).argmin()))
-    raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
+    if time is None and (file.suffix == ".disks" or holds_configuration(file)):
+        return load(file, frame)
+    with RunFile(file) as run:
+        if time is not None:
+            if run.attributes.get("task") != "drive":
+                raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
+            frame = int(abs(run.observable("time") - time).argmin())
+        return packing_in(run, frame)
 
 
 def plain(value: Any) -> Any:

@@ -5,7 +5,7 @@ import pytest
 from linearised import dissipative, matrices
 
 from faultgouge.analysis.responses.response import floor_force, impulse_response, layer_force, linear_response
-from faultgouge.analysis.responses.signals import Signal, SignalError, pulse
+from faultgouge.analysis.responses.signals import Signal, pulse
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408
@@ -73,18 +73,3 @@ def test_pulse_peaks_where_it_says():
     assert frequency[np.abs(np.fft.rfft(wave.value, 1 << 16)).argmax()] == pytest.approx(3.0, rel=1e-2)
     assert abs(wave.value[0]) < 1e-8
     assert wave.value.max() == pytest.approx(1.0, rel=2e-4)  # the peak lies between two rows
-
-
-@pytest.mark.parametrize(
-    ("time", "value", "says"),
-    [
-        ([0.0], [1.0], "two rows or more"),
-        ([0.0, 1.0], [1.0], "two columns of one length"),
-        ([0.0, 1.0], [1.0, np.nan], "row 2 of the signal has the value nan"),
-        ([0.0, np.inf], [1.0, 1.0], "row 2 of the signal has the time inf"),
-        ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "the time 1 in row 3 of the signal is not later than the 2 before it"),
-    ],
-)
-def test_bad_signals_are_refused(time, value, says):
-    with pytest.raises(SignalError, match=says):
-        Signal(time, value)

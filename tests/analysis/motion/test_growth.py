@@ -41,22 +41,6 @@ def test_rate_of_a_complex_pair(eigenvalue, shape):
     assert abs(growth.rate - rate) < 5 * growth.error + 1e-9 * rate
 
 
-@pytest.mark.parametrize(
-    ("time", "msd", "says"),
-    [
-        (np.arange(10), np.ones(9), "one length"),
-        ([0, 1, 3] * 40, np.ones(120), "must increase"),
-        (np.geomspace(1, 1e5, 200), np.exp(1e-4 * np.geomspace(1, 1e5, 200)), "stretches with"),
-        (np.arange(100), np.ones(100), "decade"),
-        (np.arange(100), np.zeros(100), "0 samples"),
-        (np.arange(30), np.exp(np.arange(30)), "samples"),
-    ],
-)
-def test_no_growth_to_fit(time, msd, says):
-    with pytest.raises(ValueError, match=says):
-        fit_growth(time, msd, 0.5, 1e9)
-
-
 def test_rate_from_samples_at_uneven_times():
     """Those of an undamped run: equally spaced, and besides at times that grow geometrically."""
     every = 50 * np.arange(1, 2001)

@@ -1,7 +1,5 @@
 """The motion of linearised packings: against other methods, near and at coalescences, and against LAMMPS."""
 
-from dataclasses import replace
-
 import mpmath
 import numpy as np
 import pytest
@@ -128,21 +126,3 @@ def test_motion_of_a_packing_against_the_exponential(cluster, dissipation):
     expected = mean_square_displacement(moved, packing.position, packing.box_length)
     np.testing.assert_allclose(found.msd, expected, rtol=1e-6)
     np.testing.assert_allclose(found.layer_velocity, known[:, 18:24][:, packing.top].mean(axis=1), atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "says"),
-    [
-        ({"times": [-1.0]}, "negative"),
-        ({"times": [[1.0]]}, "list"),
-        ({"times": [0.05], "dt": 0.02}, "multiples"),
-        ({"dt": -0.1}, "dt = -0.1 must be positive"),
-        ({"force": np.zeros(5)}, "force has shape"),
-        ({"initial": np.zeros((3, 6))}, "initial has shape"),
-    ],
-)
-def test_impossible_responses(cluster, wrong, says):
-    with pytest.raises(ValueError, match=says):
-        linear_response(cluster, **({"times": [1.0]} | wrong))
-    with pytest.raises(ValueError, match="undamped"):
-        linear_response(replace(cluster, drag_time=1.0), [1.0], dt=0.1)

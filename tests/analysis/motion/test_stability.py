@@ -11,7 +11,6 @@ from three_disks import balanced, stuck_at_rest, three_disks
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, one_sided_motion, stability, transient_gain
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import pushes as pushes_module
-from faultgouge.analysis.motion import stability as stability_module
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.motion.reach import reach_of
 from faultgouge.analysis.motion.verdict import as_known
@@ -40,20 +39,6 @@ def test_stability_of_three_disks():
     rising, twice = (stability(at_rest, rise=size * RISE, time=4.0).rising for size in (1, 2))
     assert twice.drift == pytest.approx(2 * rising.drift, rel=1e-9)
     assert dict(rising) == rising.as_dict() | {"other_start": rising.other_start}
-
-
-def test_directions_and_times_are_refused_before_work_starts(monkeypatch):
-    at_rest = balanced(three_disks())
-    held = derive_frozen(at_rest, free=np.array([False, True, True]))
-    monkeypatch.setattr(stability_module, "linear_verdict", None)
-    for where, given, says in (
-        (at_rest, {"rise": "fx"}, "upper layer"),
-        (at_rest, {"rise": np.zeros((3, 2))}, "a force on no particle that moves"),
-        (held, {"rise": np.outer([1.0, 0.0, 0.0], [1.0, 0.0])}, "a force on no particle that moves"),
-        *((at_rest, {"time": time}, "followed is a positive number, not ") for time in (-1, 0, np.nan, "long")),
-    ):
-        with pytest.raises(ValueError, match=says):
-            stability(where, **given)
 
 
 def test_without_dissipation_no_push_comes_to_rest():

@@ -115,17 +115,3 @@ def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     )
     assert below < 0 < above
     assert window.error < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("cn", "loads", "says"),
-    [
-        (1.0, [0.02], "increasing"),
-        (1.0, [0.02, 0.01], "increasing"),
-        (1.0, [0.0, np.nan], "increasing"),
-        (0.0, [0.0, 0.001], "no dissipation"),
-    ],
-)
-def test_impossible_searches(path, cn, loads, says):
-    with pytest.raises(ValueError, match=says):
-        find_onset(with_dissipation(path, cn=cn), loads, dissipation=True)

@@ -39,7 +39,7 @@ def pushed_layer(packing, push, times, size=PUSH):
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
         set_velocity(engine.lammps, packing.configuration, size * push)
         for time in times:
-            moved = dynamics.advance(round(time / dt) - dynamics.steps)
+            moved = dynamics.advance(round(time / dt) - engine.steps)
             found.append(mean_square_displacement(moved.position, packing.position, packing.box_length) / size**2)
     return np.array(found)
 
