@@ -269,7 +269,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
     below = is_negative(marked.values, overlap, rounding, zero)
     resists = below | ~is_zero(marked.values, overlap, alike, zero)
-    free = int(np.sum(np.abs(values) <= alike) - np.sum(resists & (np.abs(marked.values) <= alike)))
+    drift = np.count_nonzero(np.abs(values) <= alike) - np.count_nonzero(resists & (np.abs(marked.values) <= alike))
     below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     noise = int(np.count_nonzero(marked.values.imag > 0))
@@ -280,7 +280,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
         _sorted(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
-        rattlers=packing.rattlers, rounding=rounding, free=free, packing=packing,
+        rattlers=packing.rattlers, rounding=rounding, free=int(drift), packing=packing,
     )  # fmt: skip
 
 

@@ -1,8 +1,5 @@
-"""The picture of a sweep: the share of scenes with an onset up to F_x.
-
-Scenes with the same values of all swept keys but the seed are one sample, a curve each
-(:func:`~faultgouge.studies.statistics.course`).
-"""
+"""The picture of a sweep: the share of scenes with an onset up to F_x, a curve for each sample of scenes that have the
+same values of all swept keys but the seed."""
 
 from __future__ import annotations
 

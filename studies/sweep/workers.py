@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from importlib.metadata import version
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from typing import Any
 
 from mpi4py import MPI
@@ -49,16 +50,19 @@ def open_executor(workers: int | None, executor: Executor | None = None) -> Iter
     The workers are processes of this machine, one for each core if `workers` is None. Under mpiexec its ranks replace
     the processes. An executor that is given replaces both, and is not shut down.
     """
-    number = cores() if workers is None else workers
     if executor is not None:
         yield executor
     elif MPI.COMM_WORLD.size > 1:
         ranks: Any
         with MPICommExecutor(MPI.COMM_WORLD) as ranks:
             yield ranks
-    elif number < 2:
+    elif (number := cores() if workers is None else workers) < 2:
         yield None
     else:
+        # the tracker would warn of semaphores where this process is killed; it frees them all the same
+        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
+        resource_tracker.ensure_running()
+        sys.warnoptions.pop()
         # no fork: MPI and LAMMPS do not survive one
         pool = ProcessPoolExecutor(number, get_context("spawn"), initializer=_begin, initargs=(os.getpid(),))
         try:
@@ -74,10 +78,8 @@ def _begin(parent: int) -> None:
 
 
 def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint]) -> Generator[Row, None, None]:
-    """The rows of points as they end; closing the generator takes back those that no worker has begun.
-
-    Raises BrokenExecutor if a worker was killed.
-    """
+    """The rows of points as they end, BrokenExecutor if a worker was killed; closing the generator takes back those
+    that no worker has begun."""
     groups: dict[str, list[SweepPoint]] = defaultdict(list)
     for point in points:
         groups[point.settling_key].append(point)

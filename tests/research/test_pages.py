@@ -8,39 +8,30 @@ import pytest
 from reference_layer import parted
 
 RESEARCH = Path(__file__).parents[2] / "research"
-LONG = {"cycle.make", "modes.page", "genericity.make"}
-PAGES = {
-    # what writes it: the page, and its numbers in a file
-    "coverage.make:write_page": ("README.md", None),
-    "cycle.make:write_page": ("README.md", None),
-    "cycle.further:write_further": ("further.md", None),
-    "genericity.make:write_page": ("README.md", "genericity.json"),
-    "lammps_laws.make:write_page": ("README.md", None),
-    "laws.page:write_page": ("README.md", "laws.json"),
-    "modes.page:write_page": ("README.md", "modes.json"),
-    "protocols.make:write_page": ("README.md", None),
-    "rising.make:write_page": ("README.md", None),
-    "validation.make:write_page": ("README.md", None),
-    "yielding.page:write_page": ("README.md", None),
-    "yielding.page:write_lasting": ("further.md", None),
-}
+LONG = ("cycle.make", "modes.page", "genericity.make")
+WRITERS = ("coverage.make", "lammps_laws.make", "laws.page", "protocols.make", "rising.make", "validation.make")
+FURTHER = {"cycle.further": "write_further", "yielding.page further": "write_lasting"}
+NUMBERS = {"genericity.make": "genericity.json", "laws.page": "laws.json", "modes.page": "modes.json"}
 
 
 @pytest.mark.parametrize(
     "writer",
-    [pytest.param(each, marks=pytest.mark.long if each.split(":")[0] in LONG else pytest.mark.slow) for each in PAGES],
+    [
+        *(pytest.param(each, marks=pytest.mark.long) for each in LONG),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (*WRITERS, "yielding.page", *FURTHER)),
+    ],
 )
 def test_a_page_is_what_its_tables_make(tmp_path, monkeypatch, writer):
-    module, name = writer.split(":")
-    page, numbers = PAGES[writer]
+    module = writer.split()[0]
     folder, made = RESEARCH / module.split(".")[0], import_module(f"research.{module}")
-    if module == "genericity.make":
+    if writer == "genericity.make":
         monkeypatch.setattr(made, "draw_all", lambda *_: None)  # pictures depend on fonts
     if (folder / "tables").is_dir():
         shutil.copytree(folder / "tables", tmp_path / "tables")
-    given = (folder / "tables", tmp_path) if module in ("laws.page", "modes.page") else (tmp_path,)
-    assert getattr(made, name)(*given).read_text() == (folder / page).read_text()
-    if numbers:
-        (words, found), (stored, expected) = (parted(each / numbers) for each in (tmp_path, folder))
+    given = (folder / "tables", tmp_path) if writer in ("laws.page", "modes.page") else (tmp_path,)
+    page = getattr(made, FURTHER.get(writer, "write_page"))(*given).read_text()
+    assert page == (folder / ("further.md" if writer in FURTHER else "README.md")).read_text()
+    if writer in NUMBERS:
+        (words, found), (stored, expected) = (parted(each / NUMBERS[writer]) for each in (tmp_path, folder))
         assert words == stored
         assert found == pytest.approx(expected, rel=1e-12)  # logarithms and sums differ by processor

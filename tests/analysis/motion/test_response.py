@@ -1,6 +1,5 @@
 """The motion of linearised packings: against other methods, near and at coalescences, and against LAMMPS."""
 
-
 import mpmath
 import numpy as np
 import pytest
