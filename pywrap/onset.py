@@ -141,19 +141,14 @@ def onset_run(
                     reached(equilibrium)
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-        options: dict[str, Any] = {
-            "dissipation": dissipation,
-            "first": first,
-            "folder": folder,
-            "ranks": search_ranks(),
-        }
+        options: dict[str, Any] = {"dissipation": dissipation, "first": first, "folder": folder}
         try:
-            found = find_onset(lambda fx: with_dashpots(path(fx)), forces, **options)
+            found = find_onset(lambda fx: with_dashpots(path(fx)), forces, ranks=search_ranks(), **options)
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:  # as the user of a scene reads it
             undamped = getattr(error, "undamped", None)
-            damped_alone = {"undamped": with_path_error(undamped, path)} if undamped else {}
+            damped_alone: dict[str, Any] = {"undamped": with_path_error(undamped, path)} if undamped else {}
             if isinstance(error, OnsetError) and not flows:
                 failure: Any = NoGrowthError if undamped else OnsetError
                 raise failure(error.finding, "raise ramp.until", error.finer, **damped_alone) from error

@@ -182,7 +182,8 @@ class LammpsState(Decks):
 
     def _of_width(self, slips: Floats) -> Floats:
         """Rows of fix slips as wide as LAMMPS has them, or LAMMPS's as wide as these."""
-        missing = self._columns_of("slips") - slips.shape[1]
+        ready = self._displacing and self._set_up  # nothing has been done since the last displacement was read
+        missing = (self._slip_columns if ready else self._columns_of("slips")) - slips.shape[1]
         if missing < 0:
             self.command(f"fix_modify slips capacity {(slips.shape[1] - 1) // self._slip_width}")
         return np.pad(slips, ((0, 0), (0, missing))) if missing > 0 else slips
@@ -193,7 +194,8 @@ class LammpsState(Decks):
         position, low = self._positions(columns)
         if static.law.frictional:
             angle, floor = columns[:, ANGLE_COLUMN], self.gather("f_floor", self._floor_columns)
-            graph, slip, slip_low = self._contacts(self.gather("f_slips", self._columns_of("slips")), floor)
+            self._slip_columns = self._columns_of("slips")
+            graph, slip, slip_low = self._contacts(self.gather("f_slips", self._slip_columns), floor)
         else:
             angle, contacts = self._angle, touching(position, static.radius, static.box_length)
             graph, slip, slip_low = ContactGraph(contacts, static.radius), contacts.slip, None

@@ -307,7 +307,10 @@ class Record:
                 times, seen = zip(*motions, strict=True)
                 low = [motion.position_low for motion in seen if motion.position_low is not None]
                 file.append_trajectory(times, [motion.position for motion in seen], low or None)
-            file.put_checkpoint(**({} if reached is None else {"step": reached.step, **reached.state}))
+            if reached is None:
+                file.put_checkpoint()
+            else:
+                file.put_checkpoint(step=reached.step, **reached.state)
         self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
 
     def _say_saved(self, more: str = "") -> None:

@@ -119,10 +119,11 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy and tolerance > TOLERANCES[-1]:
             return packing  # out of steps: the layer sinks; rounding of forces apart
         report_progress("Newton's method")
-        gather, (start, found) = 1.0, minimize_energy(packing)
+        packing, found = minimize_energy(packing)
         if found:
             break
-    return start
+        start, gather = packing, 1.0
+    return packing
 
 
 def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) -> tuple[Packing, bool]:
