@@ -191,7 +191,7 @@ def volume_of(configuration: Configuration, volume: float | None = None) -> tupl
         tilted = np.any(c.wall & (along > FLAT_NORMAL) & (along < 1 - FLAT_NORMAL))
         if low is None or high is None or tilted:
             open_side = f"along {AXIS_NAMES[axis]} it is neither periodic nor between two flat walls that it touches"
-            raise BadInputError(f"The packing has no volume: {open_side}; give volume=, or the area of disks.")
+            raise BadInputError(f"The packing has no volume: {open_side}; give volume=, of disks the area.")
         edges[axis] = (high - low) * np.eye(3)[axis]
         words.append(f"between walls at {AXIS_NAMES[axis]} = {low:g} and {high:g}")
     return float(abs(np.linalg.det(edges))), ", ".join(words)
@@ -276,7 +276,10 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     _require_laws(configuration, "The moduli")
     d, c = configuration.dimension, configuration.contacts
     if not np.all(configuration.periodic[:d]) or configuration.constraint is not None or c.wall.any():
-        raise BadInputError("Elastic moduli are those of a box periodic along all of its axes, without walls and lids.")
+        others = "stress(packing, volume) is that of others"
+        raise BadInputError(
+            f"Elastic moduli are those of a box periodic along all of its axes, without walls: {others}."
+        )
     volume, box = volume_of(configuration)
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:
