@@ -82,11 +82,9 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
 
     def rates(q: Floats) -> tuple[Floats, Floats]:
         """Changes of the overlaps, shape (C,), and slips, (C, 3), of displacements or velocities."""
-        shift = (u @ q).reshape(-1, 3)
+        shift, roll = (u @ q).reshape(-1, 3), np.cross(c.normal, (w @ q).reshape(-1, 3))
         along = np.einsum("ca,ca->c", c.normal, shift)
-        return -along, ~c.couple[:, None] * (shift - along[:, None] * c.normal) + np.cross(
-            c.normal, (w @ q).reshape(-1, 3)
-        )
+        return -along, ~c.couple[:, None] * (shift - along[:, None] * c.normal) + roll
 
     stiff, limit, force, b = c.tangential_stiffness, c.normal_force, c.tangential_force, c.overlap_derivative()
     share = np.where(c.normal_force > 0, ratio(c.friction, c.normal_force), np.inf)

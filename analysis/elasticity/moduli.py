@@ -191,9 +191,8 @@ def volume_of(configuration: Configuration, volume: float | None = None) -> tupl
         tilted = np.any(c.wall & (along > FLAT_NORMAL) & (along < 1 - FLAT_NORMAL))
         if low is None or high is None or tilted:
             open_side = f"along {AXIS_NAMES[axis]} it is neither periodic nor between two flat walls that it touches"
-            raise BadInputError(f"The packing has no volume: {open_side}; give volume=, or the area of disks.")
-        edges[axis] = 0.0
-        edges[axis, axis] = high - low
+            raise BadInputError(f"The packing has no volume: {open_side}; give volume=, of disks the area.")
+        edges[axis] = (high - low) * np.eye(3)[axis]
         words.append(f"between walls at {AXIS_NAMES[axis]} = {low:g} and {high:g}")
     return float(abs(np.linalg.det(edges))), ", ".join(words)
 
@@ -277,7 +276,10 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     _require_laws(configuration, "The moduli")
     d, c = configuration.dimension, configuration.contacts
     if not np.all(configuration.periodic[:d]) or configuration.constraint is not None or c.wall.any():
-        raise BadInputError("Elastic moduli are those of a box periodic along all of its axes, without walls and lids.")
+        others = "stress(packing, volume) is that of others"
+        raise BadInputError(
+            f"Elastic moduli are those of a box periodic along all of its axes, without walls: {others}."
+        )
     volume, box = volume_of(configuration)
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:
@@ -299,10 +301,9 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
         force = sum(weight * (each.force_by_u @ u + each.force_by_w @ w) for weight, each in by_motion)
         return np.asarray(np.einsum("cb,can->abn", branch, force).reshape(3, 3, 3, 3) / -volume)
 
-    u, w = (
-        (rows @ moved).reshape(affine_u.shape)
-        for rows in (configuration.pair_rows(), configuration.pair_rows(arms=c.slip_arm))
-    )
+    shape = affine_u.shape
+    u = (configuration.pair_rows() @ moved).reshape(shape)
+    w = (configuration.pair_rows(arms=c.slip_arm) @ moved).reshape(shape)
     affine, work, sigma = of_stress(affine_u, 0 * affine_u), of_stress(affine_u + u, w), -stress(configuration)
     turned = np.einsum("al,bk->abkl", sigma, one) - np.einsum("ab,kl->abkl", sigma, one)
     by_gradient, affine = work + turned, affine + turned

@@ -110,8 +110,8 @@ class RunFile(AbstractContextManager["RunFile"]):
         with new_sealed() as file:
             write_h5md(file)
             disks, shape = file.create_group("particles/disks"), (len(packing), 3)
-            along = "none" if packing.box_length is None else "periodic"
-            disks.create_group("box").attrs.update({"dimension": 3, "boundary": np.array([along, *2 * ["none"]], "S8")})
+            sides = ["none" if packing.box_length is None else "periodic", "none", "none"]
+            disks.create_group("box").attrs.update({"dimension": 3, "boundary": np.array(sides, "S8")})
             position = disks.create_group("position")
             for clock, kind in (("step", np.int64), ("time", np.float64)):
                 position.create_dataset(clock, (0,), kind, maxshape=(None,), **CHECKSUM)

@@ -47,7 +47,8 @@ def _solid_in_box(configuration: Configuration) -> float:
     d = configuration.dimension
     edges = [axis for axis, closed in zip("xyz"[:d], configuration.periodic[:d], strict=True) if not closed]
     if edges:
-        raise BadInputError(f"solid_fraction is that of a periodic box, and this one is open along {', '.join(edges)}.")
+        where = f"this one is open along {', '.join(edges)}"
+        raise BadInputError(f"solid_fraction is that of a periodic box, and {where}: take a volume of your own.")
     volume = np.pi * configuration.radius**2 if d == 2 else 4 / 3 * np.pi * configuration.radius**3
     return float(volume.sum() / abs(np.linalg.det(configuration.box[:d, :d])))
 

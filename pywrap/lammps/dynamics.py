@@ -82,11 +82,6 @@ class Dynamics:
         return float(self._lammps.extract_global("dt"))
 
     @property
-    def steps(self) -> int:
-        """Time steps so far."""
-        return self._engine.steps
-
-    @property
     def drawn(self) -> tuple[float, float]:
         """Force of the spring on each disk of the layer that it draws, and displacement of the layer, length."""
         return float(self._lammps.extract_fix("drive", 0, 0)), float(self._lammps.extract_fix("drive", 0, 1, 0))

@@ -64,18 +64,10 @@ def cluster(request: pytest.FixtureRequest) -> Packing:
     share = np.resize([0.3, -0.99, 1.5, -0.2, 0.6, -1.5, 0.9], len(found))
     slip = share * law.slip_limit(bare.geometry.overlap)
     return Packing(
-        position=position,
-        radius=radius,
-        angle=[0.1, -0.2, 0.3, 0.0, 1.0, 2.0],
-        mass=[1.0, 2.0, 1.0, 0.5, 1.0, 1.0],
-        inertia_factor=0.5,
-        contacts=Contacts(found.i, found.j, slip),
-        law=law,
-        box_length=3.95,
-        top=[False, False, False, True, True, False],
-        fx=0.5,
-        fy=3.0,
-    )
+        position=position, radius=radius, angle=[0.1, -0.2, 0.3, 0.0, 1.0, 2.0], mass=[1.0, 2.0, 1.0, 0.5, 1.0, 1.0],
+        inertia_factor=0.5, contacts=Contacts(found.i, found.j, slip), law=law, box_length=3.95,
+        top=[False, False, False, True, True, False], fx=0.5, fy=3.0,
+    )  # fmt: skip
 
 
 @pytest.fixture

@@ -55,14 +55,8 @@ def one_contact(law, overlap, share, radii=(0.5, 0.7), place=(3.1, 2.2), box=Non
         points[:, 0] %= mpf(box)
     position = points.astype(np.float64)
     partners = ([0], [FLOOR if len(radii) == 1 else 1])
-    bare = Packing(
-        position=position,
-        position_low=(points - position).astype(np.float64) if compensated else None,
-        radius=radii,
-        law=law,
-        box_length=box,
-        contacts=Contacts(*partners, [0.0]),
-    )
+    low, contacts = (points - position).astype(np.float64) if compensated else None, Contacts(*partners, [0.0])
+    bare = Packing(position=position, position_low=low, radius=radii, law=law, box_length=box, contacts=contacts)
     slip = share * law.slip_limit(bare.geometry.overlap)
     return replace(bare, contacts=Contacts(*partners, slip, 1e-17 * slip if compensated else None))
 

@@ -102,14 +102,8 @@ def test_net_force_is_that_of_the_loop(cluster):
 
 
 def test_residual_leaves_out_rattlers_of_the_upper_layer():
-    packing = Packing(
-        position=[[0, 0.5], [5, 3]],
-        radius=[0.5, 0.5],
-        top=[True, True],
-        fy=3.0,
-        contacts=Contacts([0], [-1], [0]),
-        law=LAW,
-    )
+    position, contacts = [[0, 0.5], [5, 3]], Contacts([0], [-1], [0])
+    packing = Packing(position=position, radius=[0.5] * 2, top=[True] * 2, fy=3.0, contacts=contacts, law=LAW)
     # An open contact is none: a disk that only touches at a point is a rattler too.
     np.testing.assert_array_equal(packing.rattlers, [0, 1])
     assert packing.residual == 0
@@ -120,14 +114,9 @@ def test_residual_leaves_out_rattlers_of_the_upper_layer():
 
 def test_solid_fraction_is_the_share_of_points_below_the_layer_that_lie_in_disks():
     """Disks that do not touch, so that no point lies in two; one is cut by the height, one lies above it."""
-    packing = Packing(
-        position=[[0.5, 0.5], [1.9, 0.7], [0.7, 1.6], [2.3, 1.8], [1.4, 3.0]],
-        radius=[0.5, 0.7, 0.5, 0.3, 0.4],
-        top=[False, False, True, True, False],
-        contacts=Contacts([], [], []),
-        law=LAW,
-        box_length=3.0,
-    )
+    position, top = [[0.5, 0.5], [1.9, 0.7], [0.7, 1.6], [2.3, 1.8], [1.4, 3.0]], [False, False, True, True, False]
+    radius, none = [0.5, 0.7, 0.5, 0.3, 0.4], Contacts([], [], [])
+    packing = Packing(position=position, radius=radius, top=top, contacts=none, law=LAW, box_length=3.0)
     x, y = np.meshgrid(np.arange(0.0005, 3.0, 1e-3), np.arange(0.0005, 1.7, 1e-3))
     inside = sum((x - c) ** 2 + (y - d) ** 2 < r**2 for (c, d), r in zip(packing.position, packing.radius, strict=True))
     # a grid of 1e-3 misses a perimeter of 14 by a hundredth of its width

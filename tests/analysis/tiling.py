@@ -11,20 +11,11 @@ def tile(cell: Packing, copies: int) -> Packing:
     """Copies side by side, in balance as the packing itself is."""
     n, contacts = len(cell), cell.contacts
     index = np.arange(copies)[:, None]
-    image = np.where(
-        contacts.floor,
-        0,
-        np.round((cell.position[contacts.i, 0] - cell.position[contacts.j, 0]) / cell.box_length).astype(int),
-    )
+    across = (cell.position[contacts.i, 0] - cell.position[contacts.j, 0]) / cell.box_length
+    image = np.where(contacts.floor, 0, np.round(across).astype(int))
     j = np.where(contacts.floor, -1, contacts.j + n * ((index + image) % copies))
     shift = np.column_stack([cell.box_length * np.arange(copies), np.zeros(copies)])
-    return replace(
-        cell,
-        position=(cell.position + shift[:, None]).reshape(-1, 2),
-        radius=np.tile(cell.radius, copies),
-        angle=np.tile(cell.angle, copies),
-        mass=np.tile(cell.mass, copies),
-        top=np.tile(cell.top, copies),
-        box_length=copies * cell.box_length,
-        contacts=Contacts((contacts.i + n * index).ravel(), j.ravel(), np.tile(contacts.slip, copies)),
-    )
+    many = {name: np.tile(getattr(cell, name), copies) for name in ("radius", "angle", "mass", "top")}
+    joined = Contacts((contacts.i + n * index).ravel(), j.ravel(), np.tile(contacts.slip, copies))
+    position = (cell.position + shift[:, None]).reshape(-1, 2)
+    return replace(cell, position=position, box_length=copies * cell.box_length, contacts=joined, **many)

@@ -87,7 +87,7 @@ def test_deck(faultgouge_here, taken, tmp_path, shape):
     else:
         assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
     for command, *words, says in refusals:
-        assert says in faultgouge_here(command, "pile.h5", *words, code=None if not words else 2).stderr
+        assert says in faultgouge_here(command, "pile.h5", *words, code=2).stderr
 
 
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"

@@ -77,6 +77,7 @@ def test_types_have_names(read):
     disks = read(XYZ, "a.xyz")
     assert upper_layer(disks, "type:Al").tolist() == [False, False, True, False]
     assert upper_layer(disks, "type:2").tolist() == [False, False, False, True]
+    assert upper_layer(disks, 2).tolist() == [True, False, True, False]  # the highest that touch something
     with pytest.raises(BadInputError, match=r"has no type Cu \(its types: Fe, Al, 2\)"):
         upper_layer(disks, "type:Cu")
 
@@ -92,10 +93,6 @@ def test_types_of_gsd_have_names(tmp_path):
     disks = read_disks(tmp_path / "a.gsd")
     assert upper_layer(disks, "type:Al").tolist() == [False, True]
     assert upper_layer(disks, "type:2").tolist() == [True, False]  # the second type, which has no such name
-
-
-def test_the_highest_disks_are_those_that_touch_something(read):
-    assert upper_layer(read(XYZ, "a.xyz"), 2).tolist() == [True, False, True, False]
 
 
 def test_a_table_of_a_laboratory_as_a_command(faultgouge_here, tmp_path):

@@ -160,9 +160,9 @@ def _function(name: str) -> Any:
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
-    taken = FILMS if frames else tuple(WRITERS)[:-1]
+    taken, what = (FILMS, "several frames go into") if frames else (tuple(WRITERS)[:-1], "exports are")
     if path.suffix not in taken:
-        what, more = ("several frames go into", "") if frames else ("exports are", "; for a .pvd add --frames all")
+        more = "" if frames else "; for a .pvd add --frames all"
         raise BadInputError(f"-o {path}: {what} {', '.join(taken)}{more}; give it one of these suffixes.")
     if modes and path.suffix in (".data", ".csv"):
         raise BadInputError(f"-o {path}: it has no room for modes; leave --mode out, or export .vtp or .xyz.")

@@ -338,13 +338,12 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
     if says is None and disks.top is None:
         add = f"add {key.rstrip(' =')}, {LAYER_WAYS}"
         raise BadInputError(f"{disks.source} does not say which disks are the upper layer: {add}.")
-    text = "" if says is None else str(says).strip()
+    layer, y = "its own column top" if says is None else f"{key}{says}", disks.position[:, 1]
     try:
-        chosen = disks.top if says is None else _layer_of(disks, text)
+        chosen = disks.top if says is None else _layer_of(disks, str(says).strip())
     except (OSError, ValueError) as error:
-        raise BadInputError(f"{key}{text}: {error}.") from None
+        raise BadInputError(f"{layer}: {error}.") from None
     if chosen is None or not chosen.any():
-        y, layer = disks.position[:, 1], "its own column top" if says is None else f"{key}{text}"
         raise BadInputError(f"{disks.source}: {layer} holds no disk; they go from y = {y.min():g} to {y.max():g}.")
     return chosen
 

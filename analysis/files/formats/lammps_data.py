@@ -53,9 +53,8 @@ def read_data(path: Path) -> Disks:
     if marked is not None:  # a file that faultgouge wrote
         comments = [(number, lines[number - 1].partition("#")[2].split()) for number, _ in rows]
         names = ["mass", "angle", "x_low", "y_low"][: len(comments[0][1])]
-        columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
-        columns["top"] = columns["type"] - 1
-        values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
+        columns |= columns_of(path, comments, names, f"{len(names)} behind the #") | {"top": columns["type"] - 1}
+        values = dict(part.split("=") for part in marked.split() if "=" in part)
         contacts = [line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)]
         more = read_back(path, values, numbers_in(" ".join(contacts), path), "x_low" in columns)
         more["periodic"] = (values.get("sides") == "p", False, False)

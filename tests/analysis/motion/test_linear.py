@@ -85,6 +85,8 @@ def test_certificate_against_lapack_on_random_packings(first):
             assert abs(found.growth_rate - slowest) <= found.error + rounding
         if found.s:
             assert np.abs(s - found.s).min() <= max(found.error, 1e-6 * top)
+        if found.stable:
+            assert found.free == len(a.toarray()) - np.linalg.matrix_rank(a.toarray(), tol=1e-8 * top**2)
     assert proofs >= 5
 
 
