@@ -16,7 +16,7 @@ from faultgouge.pywrap import Scene, SceneError
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_study_of_the_page_is_a_command_and_a_section(tmp_path, monkeypatch, faultgouge_here):
+def test_the_study_of_the_page_is_a_command_and_a_section(tmp_path, monkeypatch, capsys):
     (text,) = re.findall(r"```py\n(\"\"\"How many contacts.*?)```", (ROOT / "docs" / "howto.md").read_text(), re.DOTALL)
     folder, scene = tmp_path / "studies", SMALL | {"strong": {"share": 0.3}}
     folder.mkdir()
@@ -27,7 +27,9 @@ def test_the_study_of_the_page_is_a_command_and_a_section(tmp_path, monkeypatch,
     says = program().commands["strong"].help
     assert says.startswith("Count the contacts that carry more than a share of the largest normal force.")
     (tmp_path / "scene.toml").write_text(toml(scene))
-    printed = json.loads(faultgouge_here("strong", "scene.toml", "-o", "out", "--json").stdout)
+    monkeypatch.chdir(tmp_path)
+    program()(["strong", "scene.toml", "-o", "out", "--json"], standalone_mode=False)
+    printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((tmp_path / "out" / "strong.json").read_text())
     assert printed["scene"]["strong"] == {"share": 0.3}
     assert 0 < printed["contacts"] < printed["of"]
