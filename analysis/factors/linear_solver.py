@@ -5,12 +5,6 @@ McKee, and the coordinates of a disk together, all entries lie within a band: fo
 44 places of the diagonal. LAPACK factors the band in a quarter of the time for the full matrix, and uses so little
 memory that Python and LAMMPS stay in the processor's caches.
 
-The factorisation of K for 100,000 disks takes as long as thirty evaluations of the forces; that of its symmetric part
-takes as long as ten. From one Newton iteration to the next K changes a little everywhere, with the load, and much at a
-few contacts, which close or open. Neither change needs new factors. With the factors of a nearby matrix, or of the
-symmetric part, as preconditioner P, :math:`P^{-1} K` is the identity except for a small part and a part of low rank,
-and GMRES reduces the residual a hundredfold in some five iterations. If GMRES fails to do so, K itself is factored.
-
 A fill-reducing order of the matrix itself depends on single entries. Entries that happen to vanish, as on a crystal,
 spoil this order: the coordinates of one disk are then separated. The order of elimination is therefore found by minimum
 degree on the graph of disks and contacts. The coordinates of a disk stay together, which also gives the factorisation
@@ -26,21 +20,12 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..arrays import Floats, Indices
 from ..packing.disk_operators import SIGNS
-from .sparse_lu import Factors, SingularMatrixError, elimination_places, symmetric_lu
+from .sparse_lu import Factors, SingularMatrixError, elimination_places, general_lu
 
 Booleans = NDArray[np.bool_]
-
-RESIDUAL_SHARE = 1e-2
-"""Residual of the iterative solution, as a share of the force. A Newton iteration gains a factor of five where contacts
-open or close, and a thousand where none does. The residual costs a tenth of the last gain, and saves half of the work
-before."""
-
-GMRES_ITERATIONS = 30
-"""Iterations of GMRES that are worth while: a factorisation takes as long as fifty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,64 +92,24 @@ class BandSolver:
 
 
 class SparseSolver:
-    """K, solved with the factors of a matrix nearby as long as these serve, and then with its own. A coordinate without
-    stiffness of its own is no unknown; `i` and `j` are the pairs of disks that K couples. `own` is whether it has had
-    to make factors of its own."""
+    """K in sparse factors. A coordinate without stiffness of its own is no unknown; `i` and `j` are the pairs of disks
+    that K couples."""
 
-    def __init__(self, matrix: csr_array, i: Indices, j: Indices, nearby: "SparseSolver | None" = None) -> None:
-        self._stiffness, self._pairs, self.own = matrix.diagonal(), (i, j), False
-        self._active = np.flatnonzero(self._stiffness)
-        self._matrix = matrix[self._active][:, self._active]
-        # factors, of which coordinates they are, and whether of K itself and not of its symmetric part
-        self._made: tuple[Factors, Indices, bool] | None = None if nearby is None else nearby._made
-        self._left = [False, True]  # of which matrix factors can still be made: K, its symmetric part
+    def __init__(self, matrix: csr_array, i: Indices, j: Indices) -> None:
+        active = np.flatnonzero(matrix.diagonal())
+        self._coordinates = active[elimination_order(i, j, matrix.shape[0] // 3, active)]
+        self._factors: Factors | None = None
+        with suppress(SingularMatrixError):
+            inside = csc_array(matrix[self._coordinates][:, self._coordinates])
+            self._factors = general_lu(inside, ordered=True)
 
     def solve(self, force: Floats) -> Floats | None:
         """The solution of K dq = F, shape (3N,); None if K is singular."""
-        while True:
-            if self._made is not None:
-                step = self._with_factors(force) if self.own and self._made[2] else self._iterated(force)
-                if step is not None and np.all(np.isfinite(step)):
-                    return step
-            if not self._left:
-                return None
-            symmetric, self._made = self._left.pop(), None  # before the memory for others is taken
-            order = elimination_order(*self._pairs, len(self._stiffness) // 3, self._active)
-            matrix = 0.5 * (self._matrix + self._matrix.T) if symmetric else self._matrix
-            inside, self.own = csc_array(matrix[order][:, order]), True
-            with suppress(SingularMatrixError):
-                # nearly symmetric: pivots of K itself on the diagonal where good
-                pivoting = 0.0 if symmetric else 0.01
-                factors = symmetric_lu(inside, ordered=True, symmetric=symmetric, pivoting=pivoting)
-                self._made = factors, self._active[order], not symmetric
-
-    def _with_factors(self, force: Floats) -> Floats:
-        """The solution on the coordinates of the factors, zero on the others, shape (3N,)."""
-        assert self._made is not None
-        factors, coordinates, _ = self._made
+        if self._factors is None:
+            return None
         step = np.zeros_like(force)
-        step[coordinates] = factors.solve(force[coordinates])
-        return step
-
-    def _iterated(self, force: Floats) -> Floats | None:
-        """The solution by GMRES; None if that takes too long."""
-        assert self._made is not None
-        active, new = self._active, np.setdiff1d(self._active, self._made[1])
-
-        def apply_preconditioner(residual: Floats) -> Floats:
-            spread = np.zeros_like(force)
-            spread[active] = residual
-            step = self._with_factors(spread)
-            step[new] = spread[new] / self._stiffness[new]
-            return step[active]
-
-        # from the right, so that its residual is a force
-        shape, both = self._matrix.shape, lambda residual: self._matrix @ apply_preconditioner(residual)
-        operator = LinearOperator(shape, both, dtype=np.float64)
-        found, failed = gmres(operator, force[active], rtol=RESIDUAL_SHARE, restart=GMRES_ITERATIONS, maxiter=1)
-        step = np.zeros_like(force)
-        step[active] = apply_preconditioner(found)
-        return None if failed else step
+        step[self._coordinates] = self._factors.solve(force[self._coordinates])
+        return step if np.all(np.isfinite(step)) else None
 
 
 Solver: TypeAlias = BandSolver | SparseSolver

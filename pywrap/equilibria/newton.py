@@ -167,7 +167,7 @@ def iterate_newton(
             if len(disks):
                 displacement = _out_of_the_way(trial.packing, disks, displacement)
                 trial = engine.try_displacement(base, displacement)
-            factors = factor_stiffness(trial, floor, since, factors)
+            factors = factor_stiffness(trial, floor, since)
         earlier, last = last, trial.residual
         step = None if factors is None else factors.solver.solve(trial.force)
         if factors is None or step is None or too_long(step, base):

@@ -44,9 +44,7 @@ class StiffnessFactors(NamedTuple):
     expelled: Booleans
 
 
-def factor_stiffness(
-    trial: Trial, floor: float, since: ContactGraph | None = None, nearby: StiffnessFactors | None = None
-) -> StiffnessFactors | None:
+def factor_stiffness(trial: Trial, floor: float, since: ContactGraph | None = None) -> StiffnessFactors | None:
     """Factor K; None if nothing is held.
 
     Parameters
@@ -57,8 +55,6 @@ def factor_stiffness(
         Force that a contact has to exceed.
     since : ContactGraph, optional
         The contacts where the displacement began; by default they are those of the trial.
-    nearby : StiffnessFactors, optional
-        Those of another trial nearby, which a large packing is solved with.
     """
     graph, law = trial.graph, trial.derivatives
     loaded, old = law.normal_force > floor, None if since is None else graph.old(since)
@@ -96,5 +92,4 @@ def factor_stiffness(
     matrix.setdiag(stiffen_idle(matrix.diagonal(), np.tile(np.arange(graph.disks), 3)))
     matrix.eliminate_zeros()
     coupled = np.flatnonzero(loaded[: graph.pairs])
-    near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
-    return StiffnessFactors(SparseSolver(matrix, i[coupled], j[coupled], near), expelled)
+    return StiffnessFactors(SparseSolver(matrix, i[coupled], j[coupled]), expelled)
