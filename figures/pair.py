@@ -115,10 +115,14 @@ class PairCurve:
         return cls(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)
 
     @property
-    def parts(self) -> tuple[Floats, Floats]:
-        """Real and imaginary parts, the smaller one first, shape (n, 2) each; nan where the pair is unknown."""
-        values = self.eigenvalues
-        return np.sort(values.real, axis=1), np.sort(np.where(np.isnan(values), np.nan, values.imag), axis=1)
+    def real(self) -> Floats:
+        """Real parts, the smaller one first, shape (n, 2)."""
+        return np.sort(self.eigenvalues.real, axis=1)
+
+    @property
+    def imaginary(self) -> Floats:
+        """Imaginary parts, the negative one first, shape (n, 2); nan where the pair is unknown."""
+        return np.sort(np.where(np.isnan(self.eigenvalues), np.nan, self.eigenvalues.imag), axis=1)
 
     def smooth(self) -> "PairCurve":
         """The same pair with many points between its loads, see :func:`curve_through`."""
@@ -146,7 +150,7 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
     for number, curve in enumerate(curves):
         colour = to_hex(f"C{number}")
         fine = curve.smooth()
-        for panel, line, dots in zip((real, imaginary), fine.parts, curve.parts, strict=True):
+        for panel, line, dots in ((real, fine.real, curve.real), (imaginary, fine.imaginary, curve.imaginary)):
             panel.plot(fine.fx, line, color=colour)
             if len(curve.fx) <= DOTTED_LOADS:
                 panel.plot(curve.fx, dots, ".", color=colour, markersize=3)

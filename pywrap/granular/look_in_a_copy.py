@@ -98,8 +98,13 @@ def open_files() -> dict[int, OpenFile]:
 
 def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
     """The log of an instance that is a copy, among the open files of the process itself; the question closes it."""
+
+    def open_here() -> set[int]:
+        return {each for each in files if Path(f"/proc/self/fd/{each}").exists()}
+
+    before = open_here()  # without what Python has collected since
     lmp.command("log none")  # a log of the command `log` does not begin as others do
-    closed = [file for descriptor, file in files.items() if not Path(f"/proc/self/fd/{descriptor}").exists()]
+    closed = [files[each] for each in before - open_here()]
     return closed[0] if len(closed) == 1 else None
 
 

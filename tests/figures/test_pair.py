@@ -50,10 +50,10 @@ def test_nothing_is_drawn_between_two_loads_of_which_one_is_unknown_and_a_fallin
     pair[2] = complex(np.nan, np.nan)
     curve = PairCurve(1.0, fx, pair, None)
     fine = curve.smooth()
-    assert np.isnan(curve.parts[1][2]).all()
+    assert np.isnan(curve.imaginary[2]).all()
     assert not np.any((fine.fx > 1) & (fine.fx < 3))
     assert np.isnan(fine.fx).sum() == 1
-    np.testing.assert_array_equal(*map(np.isnan, fine.parts))
+    np.testing.assert_array_equal(np.isnan(fine.real), np.isnan(fine.imaginary))
     np.testing.assert_allclose(np.diff(fine.eigenvalues[np.isfinite(fine.fx)], axis=1), 1.0, atol=1e-12)
     assert len(curve_through(fx, np.full((5, 2), np.nan + 0j))[0]) == 0
     root = np.sqrt(1.7 - fx + 0.05 * fx**2 + 0j)
