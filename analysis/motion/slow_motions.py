@@ -13,7 +13,8 @@ takes these motions out of a state and leaves all others as they are: a left vec
 :math:`l^H X = 0`. The waves of a box may have nearly equal s: the space of all of them is well known, where single
 vectors are not. The error of s is that of its residual, :math:`|Z x - s x| / |y^H x|` with unit vectors. Where it is a
 tenth of :math:`|\mathrm{Re}\, s|` at the most, the l of a motion that does not decay has no more than a tenth in common
-with x: what the projection takes of it is no more, and the probability that it is overlooked rises by a tenth. (Saad, *Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 6 to 8.)
+with x: what the projection takes of it is no more, and the probability that it is overlooked rises by a tenth. (Saad,
+*Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 6 to 8.)
 """
 
 from collections.abc import Callable
