@@ -11,10 +11,15 @@ Let X and Y be bases of the right and of the left vectors. The projection
 
 takes these motions out of a state and leaves all others as they are: a left vector l of another motion has
 :math:`l^H X = 0`. The waves of a box may have nearly equal s: the space of all of them is well known, where single
-vectors are not. The error of s is that of its residual, :math:`|Z x - s x| / |y^H x|` with unit vectors. Where it is a
-tenth of :math:`|\mathrm{Re}\, s|` at the most, the l of a motion that does not decay has no more than a tenth in common
-with x: what the projection takes of it is no more, and the probability that it is overlooked rises by a tenth. (Saad,
-*Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 6 to 8.)
+vectors are not. With unit vectors x and :math:`\kappa = 1/|y^H x|`, and the residuals :math:`r = |Z x - s x|` and
+:math:`r' = |Z^H y - \bar s y|`, to first order
+
+- the error of s is :math:`\kappa\, r\, r' / d`, with the distance d of s from those that are not in the space;
+- a left vector l of another motion has :math:`|l^H x| \le r / |s_l - s|`, so that the projection changes l by no more
+  than the sum of :math:`\kappa\, r / |s_l - s|` over the motions. Of motion that does not decay this is largest on the
+  imaginary axis. Up to a tenth is allowed: the probability that the motion is overlooked rises by as much.
+
+(Saad, *Numerical Methods for Large Eigenvalue Problems*, 2011, ch. 3 and 6.)
 """
 
 from collections.abc import Callable
@@ -34,7 +39,7 @@ KRYLOV = 300
 def slow_motions(
     a: csr_array, g: csr_array, kept: csr_array, reference: float, drifts: int
 ) -> tuple[Complexes, Floats, Callable[[Floats], Floats]] | None:
-    """The slowest motions; None if the Krylov spaces do not hold any to a tenth of its decay.
+    """The slowest motions; None if the Krylov spaces do not hold any well enough.
 
     Parameters
     ----------
@@ -111,9 +116,14 @@ def slow_motions(
     s, y, x = eig(left.T @ image(right), left=True, right=True)
     order = np.argsort(np.abs(s))[2 * drifts :]
     s, x, y = s[order], right @ x[:, order], left @ y[:, order]
-    residual = image(x) - s * x
-    error = np.linalg.norm(residual, axis=0) * np.linalg.norm(y, axis=0) / np.abs(np.sum(y.conj() * x, axis=0))
-    if np.any(error > 0.1 * np.abs(s.real)):
+    x, y = x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0)
+    kappa = 1 / np.abs(np.sum(y.conj() * x, axis=0))
+    rest, rest_left = (np.linalg.norm(each, axis=0) for each in (image(x) - s * x, transposed(y) - s.conj() * y))
+    changes = (kappa * rest / np.abs(1j * s.imag[:, None] - s)).sum(axis=1)
+    if changes.max(initial=0.0) > 0.1:
         return None
+    beyond = min(1 / sizes[count] for _, sizes, _ in spaces)  # from the shift
+    rounding = 1e-14 * np.sqrt(np.abs(a.data).max())
+    error = kappa * (rest * rest_left / (beyond - np.abs(s - shift)) + rounding)
     right, left = (np.vstack([kept @ half for half in np.split(each, 2)]) for each in (right, left))
     return s, error, lambda states: states - right @ (left.T @ states)

@@ -230,7 +230,7 @@ class Scene(Section):
                 alone["perturb"] = Inertia
             # sections that a scene has of others: of keywords that are known at run time alone, which no overload has
             models = {key: (model, ...) for key, model in alone.items() if key in mapping}
-            found = dict(create_model("Part", **models).model_validate(mapping, context=context))  # type: ignore[call-overload]
+            found = dict(create_model("Part", **models).model_validate(mapping, context=context))  # type: ignore[call-overload]  # see above
             context["inertia"] = found.pop("perturb", Inertia())
             own = {key: section for key, section in mapping.items() if key not in alone}
             scene = cls.model_validate(own | found, context=context)
