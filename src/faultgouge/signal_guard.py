@@ -23,6 +23,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -45,9 +46,9 @@ OUTSIDE = {
 }
 """Ends of the work that are no fault of a library."""
 
-WORDS, CLOSED, ENDED = slice(0, 4096), 4096, 4097
-"""Places in the memory that guard and work share: what an interrupt leaves, in words; and the bytes that are not zero
-once the work has closed its files after a signal, and once it has come to its end."""
+WORDS, LOCK, CLOSED, ENDED = slice(0, 4096), slice(4096, 8192), 8192, 8193
+"""Places in the memory that guard and work share: what an interrupt leaves, in words; the lock file of the work; and
+the bytes that are not zero once the work has closed its files after a signal, and once it has come to its end."""
 
 _shared = mmap.mmap(-1, ENDED + 1)
 _signalled: list[float] = []
@@ -93,7 +94,20 @@ def interrupted() -> bool:
 
 def keeps(words: str, path: object = None) -> None:
     """Set what is said at an interrupt: what is kept (a record tells its file, too), and how to go on."""
-    _shared[WORDS] = words.encode(errors="surrogateescape")[:4095].ljust(4096, b"\0")
+    _put(WORDS, words)
+
+
+def holds(lock: Path) -> None:
+    """Set which lock file the guard removes if the work hangs in a library, and cannot do so."""
+    _put(LOCK, os.path.abspath(lock))
+
+
+def _put(place: slice, text: str) -> None:
+    _shared[place] = text.encode(errors="surrogateescape")[:4095].ljust(4096, b"\0")
+
+
+def _text(place: slice) -> str:
+    return _shared[place].rstrip(b"\0").decode(errors="surrogateescape")
 
 
 def has_ended() -> None:
@@ -158,6 +172,9 @@ def _watch(child: int, waited: set[signal.Signals]) -> NoReturn:
         gone, _ = os.waitpid(child, os.WNOHANG)
     if not (gone or _shared[CLOSED]):
         os.kill(child, signal.SIGSTOP)  # so that it writes no more than is said to be kept
+        with suppress(OSError):  # the lock, unless another work has it
+            if any(each.exists() and each.samefile(_text(LOCK)) for each in Path(f"/proc/{child}/fd").iterdir()):
+                os.unlink(_text(LOCK))
         if sys.stderr.isatty():
             sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
     _say(SIGNALS[signal.Signals(number)])
@@ -180,6 +197,5 @@ def _end(code: int) -> NoReturn:
 
 def _say(what: str) -> None:
     if is_root():
-        words = _shared[WORDS].rstrip(b"\0").decode(errors="surrogateescape")
         with suppress(OSError):  # nobody may be there to read it
-            print(f"Error: {what}: {words}.", file=sys.stderr, flush=True)
+            print(f"Error: {what}: {_text(WORDS)}.", file=sys.stderr, flush=True)

@@ -24,7 +24,7 @@ import typer
 from typer import Argument, Option
 from typer.models import CommandInfo
 
-from ..signal_guard import is_root, keeps
+from ..signal_guard import holds, is_root, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -145,7 +145,7 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
     Of the kind "new" it is not there yet; a "run" takes its lock itself; a "folder" is made. A table of the program
     begins with `head`.
     """
-    from faultgouge.analysis.files.atomic_write import check_output, lock_output, make_folder
+    from faultgouge.analysis.files.atomic_write import check_output, lock_of, lock_output, make_folder
 
     if kind == "new" and output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
@@ -156,6 +156,7 @@ def locked(output: Path, *inputs: Path, kind: str = "file", head: str = "") -> I
         return
     if kind == "folder":
         make_folder(output)
+    holds(lock_of(output))  # the guard removes the lock of a work that cannot do so itself
     with nullcontext() if kind == "run" else lock_output(output):
         yield
 
