@@ -17,7 +17,7 @@ from faultgouge.analysis.files.configuration_file import read_configuration, wri
 @pytest.mark.parametrize("law", LAWS)
 def test_measured_laws_and_differences_agree(beds, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
-    lmp = beds(law, d)
+    lmp = beds(law, d, True)
     laws, found = (faultgouge.from_lammps(lmp, differences=each) for each in (False, True))
     assert (laws.operators, found.operators) == ("laws", "differences")
     assert not laws.contacts.at_bound.any()
@@ -79,13 +79,12 @@ def test_dashpots_of_frozen_particles_and_weak_contacts_among_strong_ones(lammps
 
 
 @pytest.mark.parametrize("gap", [1e-13, 1e-5])
-def test_particles_that_nearly_touch(lammps_with, gap):
+def test_particles_that_nearly_touch(taken, gap):
     """LAMMPS's compute pair/local says nothing of them, and one that is displaced may feel the other one.
 
     A displacement is far longer than one of the gaps, and far shorter than the other.
     """
-    lmp = lammps_with(row((-1.5, 0), (0, 0), (1 + gap, 0)))
-    found = faultgouge.from_lammps(lmp, differences=True, balance=np.inf)
+    lmp, found = taken(row((-1.5, 0), (0, 0), (1 + gap, 0)), differences=True, balance=np.inf)
     laws = faultgouge.from_lammps(lmp, prove=False, balance=np.inf)
     assert len(found.contacts) == 0
     assert found.operator_error < 1e-5
@@ -105,11 +104,10 @@ def in_a_box(*places, down: str) -> str:
 
 
 @pytest.mark.parametrize("kisses", [False, True])
-def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
+def test_spheres_in_an_edge_and_in_a_corner_of_a_region(taken, kisses):
     """With friction at two and three faces; or at a face that bears nothing, which is about to open."""
     places = [(-5.5, -5.5, -5.5), (-4.5, -5.5, -5.5)]
-    lmp = lammps_with(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
-    found = faultgouge.from_lammps(lmp)
+    _, found = taken(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
     # where it kisses the face nothing presses the sphere along x
     assert (list(found.ids[found.one_sided_particles]), stability(found).stable) == (
         ([1], None) if kisses else ([], True)

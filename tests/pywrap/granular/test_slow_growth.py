@@ -44,7 +44,7 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
     assert of_particle(lmp, "v", 3)[1] == pytest.approx(displacement * expected, rel=1e-3)
 
 
-def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
+def test_a_small_sphere_that_rolls_hides_no_growth_of_others(taken):
     """A sphere on top of another one rolls down. Beside them a sphere of a tenth of their size feels a force that is
     left, 0.9e-4 of the mean contact force, which would be an eigenvalue of 1 of its own."""
     rolls = "group small type 3\ngroup moving type 2 3\nfix rolls small addforce 2.3e-5 0 0\nfix move moving nve/sphere"
@@ -53,8 +53,7 @@ def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
         "zplane 0 NULL contacts", kinds=(1, 2, 3), diameters=(1.0, 1.0, 0.1), load="", timestep=5e-4,
         more=f"{rolls}\nfix load moving gravity 1.0 vector 0 0 -1",
     )  # fmt: skip
-    lmp = lammps_with(stack)
-    here = faultgouge.from_lammps(lmp)
+    lmp, here = taken(stack)
     verdict = stability(here)
     assert (verdict.stable, len(spectrum(here).negative)) == (False, 2)
     of_particle(lmp, "v", 2)[0] = 1e-7
@@ -68,13 +67,12 @@ def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
 BOUNCES = "hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL"
 
 
-def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
+def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(taken):
     """Its Re s is zero but for rounding, of either sign."""
     walls = f"group bounces type 1\ngroup lossy type 2\nfix spring bounces wall/gran granular {BOUNCES}\n"
     walls += f"fix dashpot lossy wall/gran granular {LINEAR} zplane 0 NULL\nfix move all nve/sphere"
     places = [(0, 0, 0.5 - MASS / 500), (2, 0, 0.5 - MASS / 500)]
-    lmp = lammps_with(deck(places, f"granular {LINEAR}", kinds=(1, 2), diameters=(1.0, 1.0), more=walls))
-    here = faultgouge.from_lammps(lmp)
+    lmp, here = taken(deck(places, f"granular {LINEAR}", kinds=(1, 2), diameters=(1.0, 1.0), more=walls))
     verdict = stability(here)
     assert (verdict.stable, verdict.growth_rate) == (True, 0)
     assert str(verdict).startswith("stable: no motion grows, except for ")
