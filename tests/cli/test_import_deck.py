@@ -216,11 +216,7 @@ def test_packing_in_which_nothing_touches(faultgouge_here, taken):
     assert "no frame 3" in faultgouge_here("draw", "pile.h5", "--frame", "3", code=2).stderr
 
 
-# a row of three in a periodic box, and two above
-LAYERS = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
-PLACED = "create_box 1 box\n" + "".join(f"create_atoms 1 single {x} {y} 0 units box\n" for x, y in LAYERS)
-ROW = re.sub("(?m)^create_atoms .*\n", "", DISKS).replace("create_box 1 box\n", PLACED)
-ROW = ROW.replace("boundary f", "boundary p").replace("-2 2", "-1.51 1.51", 1).replace("run 6000", "run 20000")
+ROW = (Path(__file__).parent / "row.in").read_text()
 LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
 AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
 RISES, FOLLOWS = pour(rise="1e-6*elapsed"), "LAMMPS's forces change with the time, though nothing moves: a load, a wall"

@@ -6,19 +6,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, TWO, command, instance, on_slope, with_law
+from granular_packings import ALMOST_NONE, DECKS, TWO, command, instance, on_slope, with_law
 
 import faultgouge
 
 
 @pytest.fixture
 def lammps_with(tmp_path) -> Iterator[Callable[..., Any]]:
-    """Makes LAMMPS with some commands, and with a log in the folder of the test, or without."""
+    """Makes LAMMPS with some commands and a deck, and with a log in the folder of the test, or without."""
     made = []
 
-    def make(lines: str = "", *, log: str | None = "log.lammps"):
+    def make(lines: str = "", deck: str = "", *, log: str | None = "log.lammps"):
         made.append(instance(None if log is None else tmp_path / log))
         command(made[-1], lines)
+        if deck:
+            made[-1].file(str(DECKS / deck))
         return made[-1]
 
     yield make
@@ -28,10 +30,10 @@ def lammps_with(tmp_path) -> Iterator[Callable[..., Any]]:
 
 @pytest.fixture
 def taken(lammps_with):
-    """Makes LAMMPS with some commands, and takes its configuration."""
+    """Makes LAMMPS with some commands and a deck, and takes its configuration."""
 
-    def make(lines: str, **options):
-        lmp = lammps_with(lines)
+    def make(lines: str, deck: str = "", **options):
+        lmp = lammps_with(lines, deck)
         return lmp, faultgouge.from_lammps(lmp, **options)
 
     return make

@@ -17,6 +17,9 @@ ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
+DECKS = Path(__file__).parent / "decks"
+
+
 def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3, units: str = "lj") -> str:
     """The first commands of a deck: spheres, or disks, in a box."""
     return f"""

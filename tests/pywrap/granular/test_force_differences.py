@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, agree, command, deck, instance, is_proved, refused
+from granular_packings import DECKS, LAWS, agree, command, deck, instance, is_proved, refused
 from pushes import moves_alike
 from scipy.spatial import cKDTree
 
@@ -134,13 +134,9 @@ def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
 
 
 @pytest.mark.long
-def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
+def test_forces_that_depend_on_all_contacts_of_a_particle(taken):
     """In a die the model mdr has a particle's volume resist: its neighbours feel one another through it."""
-    model = "granular mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
-    die = f"region die block -3 3 -3 3 0 3.86 units box\nfix die all wall/gran/region {model} region die\n"
-    die += "fix move all nve\nfix hold all setforce 0.0 0.0 NULL\nfix drag all viscous 5"
-    places = [(0, 0, 0.49 + 0.96 * k) for k in range(4)]
-    found = faultgouge.from_lammps(lammps_with(deck(places, model, load="", more=die, run="run 20000")))
+    _, found = taken("", "die.in")
     assert found.operator_error < 1e-5
     assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in long steps, 3e-5 in short ones
     along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
@@ -161,14 +157,8 @@ def test_particles_far_apart_that_something_couples(lammps_with):
 def cone(request, tmp_path_factory):
     """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     lmp = instance(tmp_path_factory.mktemp("cone") / "log.lammps")
-    model = "granular jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
-    pour = "region pour cylinder z 0 0 2.4 9.5 24 units box\ncreate_atoms 1 random"
-    walls = f"region cone cone z 0 0 0.6 8 0 25 side in units box\nfix cone all wall/gran/region {model} region cone"
-    command(lmp, deck(
-        [], model, box="block -9 9 -9 9 -1 26", units="si", timestep=5e-4, run="run 20000",
-        fill=f"{pour} {request.param} 4711 pour overlap 0.9 maxtry 2000\nneighbor 0.1 bin",
-        more=f"{walls}\nfix move all nve/sphere\nfix drag all viscous 0.5",
-    ))  # fmt: skip
+    lmp.command(f"variable count equal {request.param}")
+    lmp.file(str(DECKS / "cone.in"))
     faultgouge.relax(lmp)
     yield lmp, faultgouge.from_lammps(lmp)
     lmp.close()

@@ -1,7 +1,5 @@
 """Contacts that slide on while vibration decays slowly: the verdict beside LAMMPS's own motion."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from pushes import pushed
@@ -15,8 +13,7 @@ from faultgouge.analysis.motion.pushes import PUSHES, random_pushes
 def test_what_slides_on_as_vibration_decays_comes_to_rest(lammps_with):
     """Vibration falls as exp(-0.0026 t), so that slips of all contacts never stop in the time that is followed. D of
     LAMMPS gains ever less in equal times, and stays about the size that is told."""
-    lmp = lammps_with()
-    lmp.file(str(Path(__file__).parent / "raised_slope.in"))
+    lmp = lammps_with(deck="raised_slope.in")
     faultgouge.relax(lmp, balance=1e-11)
     found = faultgouge.from_lammps(lmp)
     told = stability(found)
