@@ -20,10 +20,10 @@ ALMOST_NONE = "1e-12"
 DECKS = Path(__file__).parent / "decks"
 
 
-def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3, units: str = "lj") -> str:
+def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3) -> str:
     """The first commands of a deck: spheres, or disks, in a box."""
     return f"""
-units {units}
+units lj
 dimension {dimension}
 atom_style sphere
 boundary {boundary}
@@ -37,15 +37,15 @@ create_box {kinds} box
 def deck(
     places, law: str, wall: str = "", *, box: str = "block -4 4 -4 4 -2 8", boundary: str = "f f f", dimension: int = 3,
     kinds=(), diameters=(1.0,), load: str = "0 0 -1", more: str = "fix move all nve/sphere", timestep: float = 1e-3,
-    run: str = "run 0", units: str = "lj", fill: str = "", density: str = "density 1.0",
+    run: str = "run 0", fill: str = "",
 ) -> str:  # fmt: skip
     """Particles at some places, or by the commands of `fill`, with one law for pairs and for the plane of a wall, as a
     wall names it."""
     granular, placed = law.startswith("granular "), zip(kinds or [1] * len(places), places, strict=True)
     return "\n".join([
-        head(box, boundary, kinds=len(diameters), dimension=dimension, units=units), fill,
+        head(box, boundary, kinds=len(diameters), dimension=dimension), fill,
         *(f"create_atoms {k} single {x:.17g} {y:.17g} {z:.17g} units box" for k, (x, y, z) in placed),
-        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), f"set group all {density}",
+        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), "set group all density 1.0",
         "pair_style granular" if granular else f"pair_style gran/{law}",
         f"pair_coeff * * {law.removeprefix('granular ') if granular else ''}",
         f"fix floor all wall/gran {law} {wall}" if wall else "",

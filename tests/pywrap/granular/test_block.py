@@ -3,14 +3,13 @@ sphere it slides down faster and faster."""
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, of_particle, refused
+from granular_packings import command, of_particle, refused
 from pushes import PUSH, in_a_quiet_copy
 
 import faultgouge
 from faultgouge.analysis import one_sided_motion, stability
 
 FRICTION = 0.5
-LAW = f"hooke 1e3 5 tangential linear_history 300 1.0 {FRICTION} damping velocity"
 
 
 @pytest.fixture
@@ -114,18 +113,10 @@ def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
         block(1.0 + 4e-6)
 
 
-SPHERE = np.pi / 6
-UNEQUAL = deck(
-    [(-1, 0, 0.5 - SPHERE / 1e3), (1, 0, 0.05 - 1e-3 * SPHERE / 1e3)], f"granular {LAW}", "zplane 0 NULL contacts",
-    boundary="p p f", kinds=(1, 2), diameters=(1.0, 0.1),
-)  # fmt: skip
-"""A sphere, and one of a thousandth of its mass."""
-
-
 @pytest.mark.parametrize(("which", "named"), [(1, True), (2, False)])
 def test_the_mass_of_what_moves_decides_whether_its_velocity_is_named(lammps_with, which, named):
     """A velocity of 2e-5 becomes a force of 2e-5 (k m)^(1/2): 17e-4 of the mean force, or 0.5e-4; 1e-4 may be left."""
-    lmp = lammps_with(UNEQUAL)
+    lmp = lammps_with(deck="unequal.in")
     of_particle(lmp, "v", which)[1] = 2e-5
     assert ("particles move by up to 2e-05 " in str(faultgouge.from_lammps(lmp).remarks)) is named
 

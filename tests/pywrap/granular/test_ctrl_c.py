@@ -5,22 +5,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from granular_packings import DECKS
 
 SET_UP = """
-import os, signal, sys, threading, time
+import os, signal, threading, time
 from contextlib import suppress
 from pathlib import Path
+from mpi4py import MPI
+from faultgouge.pywrap import compare_motion, from_lammps, lammps_instance, lammps_path
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-sys.path.insert(0, {tests!r})
-from granular_packings import command, deck, instance
-from faultgouge.pywrap import compare_motion, from_lammps, lammps_path
-
-lmp, law = instance(Path("log.lammps")), "hertz/history 3e3 9e2 100 100 3.0 1"  # a sphere that does not turn
-command(lmp, deck([(0, 0, 0.4999)], law, "zplane 0 NULL contacts", more="fix move all nve"))
-
-
-def ctrl_c():
-    os.killpg(os.getpgid(0), signal.SIGINT)
+lmp = lammps_instance(MPI.COMM_SELF, Path("log.lammps"))
+lmp.file("{deck}")
+ctrl_c = lambda: os.killpg(os.getpgid(0), signal.SIGINT)
 """
 
 MOTION = """
@@ -75,7 +71,7 @@ print(alive)
 
 def lines_of(folder: Path, script: str) -> list[str]:
     """What a script prints, as a program with a group of processes of its own."""
-    words = [sys.executable, "-c", f"{SET_UP.format(tests=str(Path(__file__).parent))}\n{script}"]
+    words = [sys.executable, "-c", f"{SET_UP.format(deck=DECKS / 'ball.in')}\n{script}"]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=100, start_new_session=True)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()

@@ -32,17 +32,9 @@ def test_measured_laws_and_differences_agree(beds, law, d):
     assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
 
 
-def test_a_contact_at_the_bound_is_seen(lammps_with):
+def test_a_contact_at_the_bound_is_seen(taken):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
-    lmp = lammps_with(deck(
-        [(0, 0, 0), (0.99, 0, 0), (-0.99, 0, 0)], "hooke/history 1e4 4e3 0 0 0.5 1", box="block -4 4 -4 4 -0.5 0.5",
-        boundary="f f p", dimension=2, load="", run="",
-    ))  # fmt: skip
-    # particle 2 slides past the first, and is at the bound with it
-    lmp.numpy.extract_atom("v")[1, 1] = 100.0
-    command(lmp, "unfix move\nfix slow all nve/noforce\nrun 1 post no\nunfix slow\nvelocity all set 0 0 0")
-    lmp.command("fix move all nve/sphere")
-    exact = faultgouge.from_lammps(lmp, balance=np.inf)
+    lmp, exact = taken("", "passing.in", balance=np.inf)
     assert exact.contacts.at_bound.sum() == 1
     found = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
     assert set(found.ids[found.one_sided_particles]) == {1, 2}

@@ -89,10 +89,11 @@ def test_the_push_that_the_bound_is_made_for_takes_a_contact_there(bed, law, d):
     symmetric = 0.5 * (stiffness + stiffness.T).toarray()
     changes, none, best = system.changes, np.zeros((0, 1)), np.inf
     rows, viscous = (csr_array(each).toarray() for each in (changes.rows, changes.viscous))
-    for k, opens in enumerate(rows[-len(changes.bound) :]):
+    count = len(changes.bound)
+    for k, opens in enumerate(rows[2 * count : 3 * count]):
         for s in (1.0, -1.0):
             row = s * rows[k] - changes.bound_slope[k] * opens
-            dashpots = s * viscous[k] - viscous[2 * len(changes.bound) + k]
+            dashpots = s * viscous[k] - viscous[2 * count + k]
             z = np.linalg.solve(symmetric, row)
             first = changes.first(z[:, None], dashpots[:, None], none, none)[0]
             best = min(best, 0.5 * (z @ row + dashpots @ dashpots) * first**2)
