@@ -55,27 +55,16 @@ def deck(
     ])  # fmt: skip
 
 
-TWO = (
-    head("block -4 4 -4 4 0 8")
-    + """
-create_atoms 1 single 0 0 0.495 units box
-create_atoms 1 single 0 0.6 1.275 units box
-set group all diameter 1.0 density 1
-thermo_style custom step
-"""
-)
+TWO = (DECKS / "two.in").read_text()
 MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 
 
 def instance(log=None):
     """LAMMPS on the ranks of this process, with the plugin."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
     from mpi4py import MPI
 
-    from faultgouge.pywrap.lammps.instance import lammps_instance
+    from faultgouge.pywrap import lammps_instance
 
     return lammps_instance(MPI.COMM_WORLD, log)
 
@@ -101,8 +90,7 @@ def start(lmp, d: int, count: int) -> None:
     across = int(width // 1.05)
     layer = across ** (d - 1)
     for k in range(count):
-        a, b = k % layer % across, k % layer // across
-        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
+        x, y = (np.array([k % layer % across, k % layer // across]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
         height = 0.55 + 1.02 * (k // layer)
         place = (x, y, height) if d == 3 else (x, height, 0.0)
         lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")
