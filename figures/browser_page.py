@@ -26,14 +26,7 @@ from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 
 from .disk_view import View, cut, in_box
-from .followed_pairs import (
-    SECONDS_OF_1000,
-    FollowedPair,
-    Progress,
-    RampEigenvalues,
-    follow_eigenvalues,
-    members_of,
-)
+from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues, members_of
 from .mode import displacement
 from .packing import LEAST_SHARE, faces_of
 from .pair import curve_through

@@ -11,14 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from faultgouge.analysis import (
-    Mode,
-    Modes,
-    Spectrum,
-    Stability,
-    closest_to_meeting,
-    stability,
-)
+from faultgouge.analysis import Mode, Modes, Spectrum, Stability, closest_to_meeting, stability
 from faultgouge.analysis.arrays import Complexes
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
