@@ -29,17 +29,10 @@ SECONDS_OF_1000 = 18.0
 
 
 class FollowedPair(NamedTuple):
-    """A pair of eigenvalues along a ramp of S loads.
+    """A pair of eigenvalues along the equilibria of a ramp, `packings`.
 
-    Attributes
-    ----------
-    eigenvalues : ndarray of complex, shape (S, 2)
-        Both members, 1 / time^2: the one with the positive imaginary part, or the lower one, first; nan where the pair
-        is unknown.
-    planes : mapping of int to Plane
-        The two modes at each load at which the pair is known.
-    packings : sequence of Packing or Configuration
-        The equilibria.
+    `eigenvalues` (S, 2) has both members, 1 / time^2: the one with the positive imaginary part, or the lower one,
+    first; nan where the pair is unknown. `planes` has the two modes at each load at which the pair is known.
     """
 
     eigenvalues: Complexes
@@ -53,18 +46,9 @@ class FollowedPair(NamedTuple):
 
 
 class RampEigenvalues(NamedTuple):
-    """Eigenvalues along a ramp.
-
-    Attributes
-    ----------
-    values : list of ndarray of complex, shape (E,)
-        All eigenvalues at each load, 1 / time^2. A complex pair that is rounding noise has lost its imaginary parts.
-    verdicts : list of Stability
-        Whether the packing moves, for each load.
-    pairs : list of FollowedPair
-        The pairs that are complex at some load, fastest growing first; without any, the two real modes closest to
-        merging; none if a packing has fewer than two modes.
-    """
+    """All eigenvalues at each load, 1 / time^2, without the imaginary parts of pairs that are rounding noise; the
+    verdicts; and the pairs that are complex at some load, fastest growing first. Without any these are the two real
+    modes closest to merging, none if a packing has fewer than two."""
 
     values: list[Complexes]
     verdicts: list[Stability]
@@ -72,14 +56,9 @@ class RampEigenvalues(NamedTuple):
 
 
 def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress = iter) -> RampEigenvalues:
-    """Eigenvalues of equilibria in the order of their path.
+    """Eigenvalues of equilibria of the same particles in the order of their path.
 
     The motion of contacts at Coulomb's bound, which takes seconds to minutes, is followed in a single packing alone.
-
-    Parameters
-    ----------
-    packings : sequence of Packing or Configuration
-        The equilibria, all with the same particles.
     """
     values, verdicts = [], []
     pairs, kept = list[dict[int, Plane]](), dict[int, Motions]()

@@ -41,17 +41,7 @@ WAY_COLOURS = LinearSegmentedColormap.from_list("way", [BULK, "#4fb286"])
 
 
 class RunMotion(NamedTuple):
-    """Displacements of an undamped run.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium where the run began.
-    time : ndarray, shape (T,)
-        Times.
-    displacement : ndarray, shape (T, N, 2)
-        From the equilibrium, length.
-    """
+    """Displacements of an undamped run from the equilibrium where it began, shape (T, N, 2), at `time` (T,)."""
 
     packing: Packing
     time: Floats
@@ -90,19 +80,8 @@ def _power_of_ten(packing: HasConfiguration, largest: Floats) -> Floats:
 
 
 class Course(NamedTuple):
-    """A curve, and the places of packings on it.
-
-    Attributes
-    ----------
-    x, y : ndarray, shape (P,)
-        The curve.
-    places : sequence of int
-        Point of the curve of each packing.
-    labels : (str, str)
-        Of the axes.
-    words : sequence of str
-        Above each packing.
-    """
+    """A curve `x`, `y` (P,) with the labels of its axes; `places` has the point of the curve of each packing, and
+    `words` what stands above it."""
 
     x: Floats
     y: Floats
@@ -148,14 +127,8 @@ def _beside_curve(
 ) -> tuple[list[Artist], Callable[[int], None]]:  # fmt: skip
     """What moves, and the function that shows a frame, of a packing on the left and its place on a curve on the right.
 
-    Parameters
-    ----------
-    which : ndarray of int
-        The place of each frame, counted along `course.places`.
-    draw : callable
-        Puts the packing where it is at such a place.
-    key : str
-        Words below the packing.
+    `which` has the place of each frame, counted along `course.places`; `draw` puts the packing where it is at such a
+    place; `key` is words below the packing.
     """
     left, axes = panels
     says = left.text(0.5, 1.01, "", transform=left.transAxes, ha="center", va="bottom", fontsize=8)
@@ -176,13 +149,7 @@ def _beside_curve(
 
 @styled
 def film_of_run(motion: RunMotion, frames: int, dots: int | None = DOTS) -> Film:
-    """An undamped run with magnified displacements, and D(t) beside it.
-
-    Parameters
-    ----------
-    frames : int
-        How many frames; the samples of the run are taken at even intervals of time.
-    """
+    """An undamped run with magnified displacements, at even intervals of time, and D(t) beside it."""
     packing, time, factor = motion.packing, motion.time, motion.magnification()
     msd = np.sum(motion.displacement**2, axis=2).mean(axis=1)
     figure, axes, beside, points = _packing_and_curve(packing)
@@ -216,19 +183,9 @@ def film_of_ramp(
     packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS,
     course: Course | None = None, by_way: bool = False,
 ) -> Film:  # fmt: skip
-    """The equilibria of a ramp, and F_x over the displacement of the upper layer beside them.
-
-    Parameters
-    ----------
-    frames : int
-        How many frames; each equilibrium is shown for about as long as the others.
-    color : str
-        As of :func:`~faultgouge.figures.draw_packing`.
-    course : Course, optional
-        The curve beside the packings, and their places on it; F_x over the displacement by default.
-    by_way : bool
-        Whether the colours of disks show how far they have moved since the first packing, in place of the layers.
-    """
+    """The equilibria of a ramp, each for about as long as the others, and beside them the course, by default F_x over
+    the displacement of the upper layer. Colours are those of :func:`~faultgouge.figures.draw_packing`; `by_way`, those
+    of disks show how far they have moved since the first packing, in place of the layers."""
     first, course = packings[0], course or Course.of_ramp(packings)
     shifts = np.array([nearest_image(each.position - first.position, first.box_length) for each in packings])
     largest = np.linalg.norm(shifts, axis=2).max()
@@ -264,13 +221,8 @@ def film_of_ramp(
 
 
 def faces_by_way(packings: Sequence[Packing], shifts: Floats) -> list[NDArray[Any]]:
-    """Colours of the disks of each packing, shape (N, 4), greener the farther they have moved; rattlers stay white.
-
-    Parameters
-    ----------
-    shifts : ndarray, shape (S, N, 2)
-        Displacements since the first packing, length.
-    """
+    """Colours of the disks of each packing, shape (N, 4), greener the larger their `shifts` (S, N, 2) since the first;
+    rattlers stay white."""
     ways, found = np.linalg.norm(shifts, axis=2), []
     # single disks, which are squeezed out or roll, move farther than all others
     most = np.quantile(ways, 0.9, axis=1).max() or 1.0
