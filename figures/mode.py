@@ -193,9 +193,8 @@ def draw_mode(packing: HasConfiguration, number: int | None = None, axes: Axes |
 def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str) -> Figure:
     """Modes side by side, one or two, with their numbers below; a complex mode of disks also a quarter of a period
     later."""
-    spheres = packing.dimension == 3
-    phases = [(0.0, np.pi / 2) if mode.is_complex and not spheres else (0.0,) for mode in modes]
-    panels = [(mode, phase) for mode, moments in zip(modes, phases, strict=True) for phase in moments]
+    spheres, two = packing.dimension == 3, (0.0, 0.5 * np.pi)
+    panels = [(mode, phase) for mode in modes for phase in (two if mode.is_complex and not spheres else two[:1])]
     figure, axes, points = figure_for(packing, len(panels), below=0.95)
     for one, (mode, phase) in zip(axes, panels, strict=True):
         _show_mode(one, packing, mode, phase, points)

@@ -78,7 +78,7 @@ class PackingArtist:
         self, axes: Axes, packing: HasConfiguration, color: str = "none", margin: float = 0.0,
         points: float | None = None,
     ) -> None:  # fmt: skip
-        self.packing, self.margin, self.view = packing, margin, View.of(packing, margin)
+        self.axes, self.packing, self.margin, self.view = axes, packing, margin, View.of(packing, margin)
         low, high = self.view.low, self.view.high
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_axis_off()

@@ -43,11 +43,16 @@ def curve_through(load: Floats, eigenvalues: NDArray[np.complex128]) -> tuple[Fl
     return joined[:, 0].real, joined[:, 1:]
 
 
+def mean_and_square(eigenvalues: NDArray[np.complex128]) -> dict[str, Floats]:
+    """Mean of both members of a pair, and the square of their difference, 4 D."""
+    return {"mean": eigenvalues.mean(axis=1).real, "square": ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real}
+
+
 def _curve(load: Floats, eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Rows of a load and two eigenvalues along one stretch of known loads, with loads that crowd at the roots of D."""
     order = slice(None, None, -1 if load[-1] < load[0] else 1)
     load, eigenvalues = load[order], eigenvalues[order]
-    mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
+    mean, square = mean_and_square(eigenvalues).values()
     if len(load) > 1:
         mean_at, square_at = PchipInterpolator(load, mean), PchipInterpolator(load, square)
         roots = square_at.roots(extrapolate=False)
