@@ -1,6 +1,7 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
-# make test        sets everything up and runs the tests (five minutes on two cores)
+# make test        sets everything up and runs the tests (three minutes on two cores)
 # make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (half an hour)
+# make turn        runs a sixth of these, another one each day (five minutes); DAY=N is the day of the year
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it
@@ -31,7 +32,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # byte code is kept: with it the tests start in half the time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: reproduce test long plugin readers fuzz check format benchmark pictures wheel wheel-aarch64 conda docs clean
+.PHONY: reproduce test long turn plugin readers fuzz check format benchmark pictures wheel wheel-aarch64 conda docs clean
 
 reproduce: $(VENV)/.installed
 	$(BIN)/faultgouge reproduce -o results
@@ -42,6 +43,10 @@ test: $(VENV)/.test
 
 long: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m long
+
+DAY ?= $(shell date +%j)
+turn: $(VENV)/.test
+	$(PYTEST) -n 2 --dist worksteal -m long --turn $(DAY)
 
 plugin: $(VENV)/.plugin
 

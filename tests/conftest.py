@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -41,15 +42,25 @@ LIMIT = 1800
 COPIES = Path(__file__).parent / "pywrap" / "granular"
 """Tests of what looks into LAMMPS in copies of the process."""
 
+TURNS = 6
+"""Days in which each long test has its turn once."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--turn DAY`: of the tests chosen those of the files whose turn is on this day of the year."""
+    parser.addoption("--turn", type=int, metavar="DAY", help=f"files whose turn is on this day, one of {TURNS}")
+
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """What is long is slow, too. Tests of several ranks come first: xdist begins with a long run of tests for each
     worker, so that one worker has all of these and the other does not wait for its turn. Then come those that copy the
     process hundreds of times: a copy takes twice as long once other tests have imported what they need."""
     for item in items:
         if item.get_closest_marker("long") is not None:
             item.add_marker("slow")
+    if (day := config.getoption("turn")) is not None:
+        items[:] = [item for item in items if crc32(item.path.stem.encode()) % TURNS == day % TURNS]
     items.sort(key=lambda item: (item.get_closest_marker("ranks") is None, COPIES not in item.path.parents))
 
 

@@ -5,6 +5,7 @@ import pytest
 from fuzz import files, kills, ramps, scenes
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_damaged_files(tmp_path):
     assert [pair for pair in files.run(30, tmp_path, seed=1) if pair[1]] == []

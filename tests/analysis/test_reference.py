@@ -30,6 +30,7 @@ def test_loaded_packing(reference, ramp):
     np.testing.assert_allclose(values[values > 0][:10], expected["smallest_positive_10"], rtol=1e-11)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("increment", "count", "first"), [(1e-3, 22, 0), (2.5e-4, 88, 76)])
 @pytest.mark.slow
 def test_onset(ramp, increment, count, first):

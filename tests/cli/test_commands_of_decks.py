@@ -28,6 +28,7 @@ EARLY = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize("way", EARLY)
 def test_decks_that_end_early_on_two_ranks(faultgouge, tmp_path, monkeypatch, way):
@@ -72,6 +73,7 @@ def test_closed_streams(tmp_path, closed):
     assert read_configuration(tmp_path / "pile.h5").residual < 1e-6
 
 
+@pytest.mark.long
 def test_names_that_the_locale_cannot_decode(tmp_path):
     (tmp_path / "häufchen.in").write_text(DECK.format(**FLAT, word="contacts"))
     words = [BIN / "faultgouge", "import", "häufchen.in", "-o", "häufchen.h5"]

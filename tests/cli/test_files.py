@@ -186,6 +186,7 @@ def test_what_others_have_written_is_kept(refusal, stored, command):
 DRAWN = [each for each in OTHERS if each.split()[0] in ("draw", "movie", "view", "export") and "pvd" not in each]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("command", DRAWN)
 def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, command):
@@ -206,6 +207,7 @@ def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, comma
         assert len(list(frames)) > 10
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_vibrations_go_into_their_folder_again(faultgouge_here, stored):
     for _ in range(2):

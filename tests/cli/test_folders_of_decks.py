@@ -103,6 +103,7 @@ def folders(tmp_path_factory, lmp_of_the_environment):
     return {name: (place / "lmp", place / "here", found.get(decks[name])) for name, place in places.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DECKS)
 def test_folder_and_last_state(folders, name):
     theirs, ours, state = folders[name]

@@ -93,6 +93,7 @@ def test_deck(faultgouge_here, taken, tmp_path, shape):
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("walls", [1, 2])
 def test_walls_that_hand_out_no_contacts(taken, walls):
     """The word `contacts` changes no motion, and the contacts are found without it, in a corner of two walls, too."""
@@ -169,6 +170,7 @@ def test_a_deck_without_particles(not_taken, tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["log.lammps", "pile.in"]
 
 
+@pytest.mark.long
 @pytest.mark.ranks
 def test_a_deck_on_two_ranks(faultgouge, taken, tmp_path):
     """A look needs a copy of the process. What several ranks have run is taken by a process of one, a step on."""

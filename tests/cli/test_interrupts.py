@@ -150,6 +150,7 @@ def test_an_import_leaves_nothing(tmp_path, monkeypatch, number):
     assert not any(temporary.iterdir())
 
 
+@pytest.mark.long
 def test_an_import_says_that_its_file_is_written(tmp_path):
     """When it is interrupted over the verdict, which comes after the packing."""
     (tmp_path / "row.in").write_text(GRAINS.format(spheres=ROW, steps=0))

@@ -49,6 +49,7 @@ def lasts(film):
         return sum(frame.info["duration"] for frame in ImageSequence.Iterator(gif))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, tmp_path):
     (tmp_path / "scene.toml").write_text(toml(DRIVE))

@@ -53,6 +53,7 @@ def test_sweep_with_interval(printed):
     assert high - low == pytest.approx(2 * 1.96 * sqrt(share * (1 - share) / 10), rel=0.2)  # Wilson's is narrower
 
 
+@pytest.mark.long
 def test_deck(printed):
     text = printed("dem_deck")
     assert number(text, "<Configuration:") == 40
@@ -74,6 +75,7 @@ def test_spheres(printed):
     assert number(text, "drift") > 0
 
 
+@pytest.mark.long
 def test_table_of_another_code(printed):
     text = printed("other_code")
     assert number(text, "the largest force on a disk was") > 100
@@ -81,6 +83,7 @@ def test_table_of_another_code(printed):
     assert 0 < number(text, "lowest eigenvalue") < 2000
 
 
+@pytest.mark.long
 def test_wave(printed):
     """The response to a small pulse is in proportion to the pulse; the tolerance leaves room for the nonlinear part."""
     assert number(printed("wave"), "moves the layer") == pytest.approx(10, abs=0.01)
@@ -98,6 +101,7 @@ def test_slip(printed):
     assert number(text, "before the first slip:") > number(text, "complex pairs at rest:") == 0
 
 
+@pytest.mark.long
 @pytest.mark.ranks
 def test_two_ranks(printed, tmp_path):
     """The same bits on one rank and on two."""
@@ -109,6 +113,7 @@ def test_two_ranks(printed, tmp_path):
     assert number(one, "growth rate") > 0
 
 
+@pytest.mark.long
 def test_mdanalysis(printed):
     text = printed("in_mdanalysis")
     assert "6 equilibria" in text

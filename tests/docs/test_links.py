@@ -138,6 +138,7 @@ def test_the_readme_runs_in_an_empty_folder(faultgouge_here, of_script):
     assert "F_x = 0.016 " in of_script(name, **{name: text})
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({path.name for path in (ROOT / "scenes" / "examples").iterdir()} - {"pour.in"}))
 def test_examples_run(tmp_path, faultgouge_here, of_script, name):

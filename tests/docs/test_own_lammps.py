@@ -11,6 +11,7 @@ from docs.run_page import files
 PAGE = Path(__file__).parents[2] / "docs" / "howto_own_lammps.md"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_script_of_the_page(of_script):
     text, blocks = PAGE.read_text(), files(PAGE)

@@ -16,6 +16,7 @@ def written(folder, disks, rows):
     return folder / "particles.txt", folder / "contacts.txt"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("pairs", "share", "at_bound", "floppy"),
     [

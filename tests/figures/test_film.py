@@ -48,6 +48,7 @@ def test_displacements_of_a_file_are_those_of_the_nearest_image_and_a_part_of_th
         motion.between(0.4, 0.6)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_gif_holds_every_frame_stays_close_to_it_and_outlives_a_film_that_ends_early(tmp_path, motion):
     """A film is made of a file that is there, and in a minute: half of one is worth less than the one before."""

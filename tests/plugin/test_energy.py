@@ -105,6 +105,7 @@ def balance(pairs, disks):
     return way @ [FX, -FY], energy(-1) - energy(0), ended + sum(row[2] for row in looks[-1].values()), given
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("dashpots", "compensated"),

@@ -79,6 +79,7 @@ def assert_same(path, other):
         np.testing.assert_array_equal(values, there[name], err_msg=name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.slow)])
 def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
     """Cut off twice, once after disks have gone round the period."""

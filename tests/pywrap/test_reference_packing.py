@@ -58,6 +58,7 @@ def test_newton_ramp(reference, reference_packing, number, increment):
     assert max(each.residual for each in reached) < 1.5 * reached[-1].floor
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_newton_and_overdamped_dynamics_agree(reference_packing):
     """With contacts at the bound: on a monotonic ramp they slide one way, whatever the path in a step."""

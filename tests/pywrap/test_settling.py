@@ -54,6 +54,7 @@ def test_layer_that_always_sinks_is_refused():
         settle(scene(disks=60, top=3, width=12.0))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_seed_whose_layer_sinks_is_the_packing_of_its_next_loose_start():
     # which seed that is depends on the build, since settling is chaotic; of so thin a layer one start in eight sinks

@@ -20,6 +20,7 @@ def packing(loaded):
     return loaded(0.02, 2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("on", "scale"), [("layer", 1e-9), ("floor", 1e-10)])
 @pytest.mark.slow
 def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):

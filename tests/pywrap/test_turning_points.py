@@ -67,6 +67,7 @@ def test_loads_that_make_no_sense_are_refused(sections, says, refused_scene):
     assert says in refused_scene({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}} | sections)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_here):
     (tmp_path / "scene.toml").write_text(cycle([0.5, -0.5, 0.5]))

@@ -129,6 +129,7 @@ def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
     assert damped["gain"] is None  # weak dashpots have lowered the onset to below this load: there is no largest gain
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])
 @pytest.mark.slow
 def test_onset_in_si(faultgouge_here, tmp_path, damping):

@@ -48,6 +48,7 @@ def test_circle_of_hu():
         assert (row["overdamped"] > 100) == (row["share"] > 2)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_circles_and_shear_of_disks_in_lammps_again():
     """One packing for both: it comes to rest in LAMMPS in two seconds."""

@@ -60,6 +60,7 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
     assert (row["ends"], row["loads"]) == ("turning point", [])
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_command_leaves_rows_and_pictures_up_to_the_last_equilibrium(faultgouge_here, tmp_path):
     """Of thirty disks, whose branch ends where the third load is not reached."""

@@ -74,6 +74,7 @@ def test_runs_show_velocity_verlets_growth_rate(settings):
             assert point["error"] < min(1e-6, 0.01 * expected)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_study_that_fails_does_not_take_along_the_others_whose_ways_lead_to_one_equilibrium(tmp_path):
     def broken(_):

@@ -123,6 +123,7 @@ PERTURBED = {"perturb": {"time": 1.0, "amplitude": 5e-10, "omega": 0.01}, "frict
 LAW = {"law": {"kn": 2e5, "mu": [1.0, 0.8]}}
 
 
+@pytest.mark.long
 def test_what_was_found_before_a_failure_is_kept_and_first_onsets_are_those_of_whole_ramps(monkeypatch):
     def fail(*_):
         raise NoEquilibriumError("no eruption today")

@@ -113,9 +113,7 @@ class Disks:
         Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
         fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
     remark : str
-        Information that the format has lost, or units that it has; empty for none.
-    length_unit : str
-        Unit of the lengths, as the file has it; empty if it names none.
+        Information that the format has lost; empty for none.
     """
 
     source: str
@@ -137,7 +135,6 @@ class Disks:
     slips: Slips | None = None
     given: Mapping[str, float] = field(default_factory=dict)
     remark: str = ""
-    length_unit: str = ""
 
     def __len__(self) -> int:
         return len(self.radius)

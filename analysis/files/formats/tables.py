@@ -1,8 +1,7 @@
 """Text of numbers: tables made by hand, packing.json, and the text files of YADE and MercuryDPM; lines, words, frames.
 
 **CSV**: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a contact. Heads may have
-units, as in ``x [mm]`` or ``radius (µm)``. A packing has no units of its own: all lengths are brought to the unit of x,
-masses and densities to one unit of mass, degrees to radians, by pint; law and load are given in these units.
+units, as in ``x [mm]``. A packing has no units of its own, and nothing is converted: lengths in two units are refused.
 
 **YADE**, from yade.export.textExt: a line with the names of the columns, joined by underscores, and one line for each
 sphere. YADE's own export has six digits, so that overlaps are rounded.
@@ -24,9 +23,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +42,9 @@ HEADS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
 
 DECIMAL_COMMA = re.compile(r"^(\s*[-+]?\d*),(\d*(?:[eE][-+]?\d+)?\s*)$")
 
-LENGTHS = ("x", "y", "z", "radius", "diameter", "x_low", "y_low", "slip", "slip_low")
+LENGTHS = "x", "y", "z", "radius", "diameter"
+WITHOUT_UNIT = {"angle", "density", "slip"}
+"""Columns whose unit follows from others, or is the radian."""
 
 SIX_DIGITS = 7
 """Longest mantissa that YADE's %g writes, with its point."""
@@ -125,14 +124,11 @@ def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -
 
 def read_table(path: Path) -> Disks:
     """Particles of a CSV file; commas, semicolons, tabs or blanks between the numbers. Open sides."""
-    columns, length, mass = _table(path)
-    masses = f" and masses in {mass}" if mass else ""
-    remark = f"lengths are in {length}{masses}: give law and load in these units" if length else ""
-    return particles_of(path, columns, remark=remark, length_unit=length)
+    return particles_of(path, _table(path))
 
 
-def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
-    """The columns of a CSV file by name, in one unit of length and one of mass; and these units.
+def _table(path: Path) -> dict[str, Floats]:
+    """The columns of a CSV file by name.
 
     Comments (lines that begin with # or //) may stand anywhere. If numbers follow the first of them at once, the last
     comment before them has the names.
@@ -153,50 +149,21 @@ def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
     units = {ALIASES.get(name, name): unit.strip(' ])"') for name, (_, *has) in zip(names, heads, strict=True)
              for unit in has if unit.strip(' ])"') not in ("", "-", "1")}  # fmt: skip
     columns = standard_names(columns_of(path, words, names, f"the first {len(names)}", more=False))
-    known, lacking = ([name for name in LENGTHS if name in columns and (name in units) is has] for has in (True, False))
-    if lacking and (known or length):
-        where = f"{known[0]} is in {units[known[0]]}" if known else f"the disks are in {length}"
-        raise PackingFileError(f"{path}: {where}, and {lacking[0]} has no unit: give every length one, or none.")
-    unit, mass = length or (units[known[0]] if known else ""), units.get("mass", "g" if "density" in units else "")
-    if "density" in units and not unit:
-        raise PackingFileError(f"{path}: density is in {units['density']}, and lengths have no unit: give one.")
-    into = dict.fromkeys(known, unit) | {"angle": "radian", "mass": mass, "density": f"{mass}/({unit})**3"}
-    for name in into.keys() & units.keys():
-        columns[name] = columns[name] * _factor(path, name, units[name], into[name])
-    return columns, unit, mass
+    lengths = {name: units.get(name, "no unit") for name in LENGTHS if name in columns}
+    if len(set(lengths.values())) > 1 or units.keys() & columns.keys() & WITHOUT_UNIT:
+        says = ", ".join(f"{name} has {unit}" for name, unit in (units | lengths).items() if name in columns)
+        cure = "give all lengths in one unit, angles in radians, and densities and slips in the unit of the lengths"
+        raise PackingFileError(f"{path}: nothing is converted, and {says}: {cure}, without a unit in their head.")
+    return columns
 
 
-@cache
-def unit_registry() -> Any:
-    """The units that pint knows."""
-    from pint import UnitRegistry
-
-    return UnitRegistry()
-
-
-def _factor(path: Path, name: str, unit: str, into: str) -> float:
-    """Factor of the numbers of a column."""
-    from pint import PintError
-
-    try:
-        # parts of ten are exact, which a product of rounded powers is not
-        return float(f"{unit_registry().Quantity(1, unit).to(into).magnitude:.15g}")
-    except (PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
-        reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no unit"
-        raise PackingFileError(f"{path}: the unit of {name}, {unit!r}, does not convert to {into}: {reason}.") from None
-
-
-def contact_columns(
-    path: Path, *needed: str, length: str = "", frame: int = -1, names: Sequence[str] | None = None
-) -> dict[str, Floats]:
+def contact_columns(path: Path, *needed: str, frame: int = -1, names: Sequence[str] | None = None) -> dict[str, Floats]:
     """The columns of a table of contacts, in CSV or as a LAMMPS dump local, by standard names.
 
     Parameters
     ----------
     *needed : str
         Columns that must be there.
-    length : str
-        The unit of the particles' lengths, where their table has one.
     frame : int
         Of a dump.
     names : sequence of str, optional
@@ -207,9 +174,7 @@ def contact_columns(
         shown = frames[choose_frame(path, [0] * len(frames), frame)]
         columns = dict(zip(shown.columns, shown.rows.T, strict=True))
     else:
-        columns, unit, _ = _table(path, length)
-        if unit and not length:
-            raise PackingFileError(f"{path}: slip is in {unit}, and the disks have no unit: leave the unit out.")
+        columns = _table(path)
     if names is not None:
         if len(names) != len(columns):
             raise BadInputError(f"--columns names {len(names)} columns, and {path} has {len(columns)}.")
@@ -221,9 +186,9 @@ def contact_columns(
     return columns
 
 
-def read_slips(path: Path, length: str = "") -> Slips:
-    """Slips of a table of contacts: id1, id2 (0 is the floor) and slip; `length` as of `contact_columns`."""
-    c = contact_columns(path, "id1", "id2", "slip", length=length)
+def read_slips(path: Path) -> Slips:
+    """Slips of a table of contacts: id1, id2 (0 is the floor) and slip, in the unit of the disks' lengths."""
+    c = contact_columns(path, "id1", "id2", "slip")
     return Slips(c["id1"].astype(np.int64), c["id2"].astype(np.int64), c["slip"], c.get("slip_low"))
 
 

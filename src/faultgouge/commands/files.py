@@ -162,7 +162,7 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
             disks = replace(disks, box_length=None if width == "open" else float(width))
         if "contacts" in given:
             known = {key: value for key, value in disks.given.items() if key != "slips_known"}
-            disks = replace(disks, slips=read_slips(given["contacts"], disks.length_unit), given=known)
+            disks = replace(disks, slips=read_slips(given["contacts"]), given=known)
         if "scene" in given:
             any_of_size = {"radii": [smallest := float(disks.radius.min())], "width": 20 * smallest}
             scene = Scene.from_toml(given["scene"], packing=any_of_size, command="settle")

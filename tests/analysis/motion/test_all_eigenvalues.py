@@ -91,6 +91,7 @@ def sliced(monkeypatch):
     monkeypatch.setattr(spectrum_module, "all_eigenvalues", lambda matrix: all_eigenvalues(matrix, **SMALL))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("coupled", [False, True])
 @pytest.mark.parametrize("in_slices", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, in_slices, request):

@@ -100,6 +100,7 @@ def test_a_contact_of_next_to_no_force_that_residual_forces_open_takes_no_verdic
     assert "the residual forces alone change 1 contact of next to no force" in told.remarks[-1]
 
 
+@pytest.mark.long
 def test_a_rested_packing_holds_for_every_push_below_its_energy(path):
     """Of forty random states of a layer below its onset, none gains more than is told; and the worst come near."""
     told = stability(stuck_at_rest(exponent=1.0))

@@ -92,6 +92,7 @@ def fastest(system):
     return np.linalg.eigvals(system.first_order).real.max()
 
 
+@pytest.mark.long
 def test_where_dashpots_couple_all_motions_the_loads_before_the_window_are_in_doubt():
     loads = [0.5, 0.55, 0.575, 0.65]
     window, doubtful = first_window(dashpot_on_all, loads)

@@ -51,6 +51,7 @@ def under_a_rising_load(lmp, rate: float, time: float, force: str) -> np.ndarray
     return of_particle(lmp, "x", 1)[:2] - before
 
 
+@pytest.mark.long
 def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
     lmp, here = block(1.0)
     assert np.all([here.contacts.at_bound, here.free])

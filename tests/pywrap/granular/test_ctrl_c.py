@@ -84,6 +84,7 @@ def lines_of(folder: Path, script: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at_the_fork", [False, True])
 def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     """A copy that would run for days."""

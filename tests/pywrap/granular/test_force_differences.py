@@ -16,6 +16,7 @@ ALL = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "d"), ALL)
 def test_measured_laws_and_differences_agree(beds, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
@@ -180,6 +181,7 @@ def cone(request, tmp_path_factory):
     lmp.close()
 
 
+@pytest.mark.long
 def test_cohesive_spheres_in_a_cone(cone, tmp_path):
     """JKR, rolling and twisting friction in a region: LAMMPS moves as K and C say, and a file has them to the bit."""
     lmp, found = cone

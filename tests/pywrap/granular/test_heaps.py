@@ -50,6 +50,7 @@ HEAPS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", HEAPS)
 def test_a_heap_after_pushes(heap, which):
     """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""

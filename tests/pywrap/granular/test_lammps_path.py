@@ -52,6 +52,7 @@ def layer(tmp_path_factory):
     lmp.close()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_tilt_of_a_slope(layer):
     """Loads in balance, back and forth, as one copy of LAMMPS after the other reaches them; then it flows."""
@@ -83,6 +84,7 @@ def test_tilt_of_a_slope(layer):
     assert np.array_equal(layer.numpy.extract_atom("x"), before)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_path_of_many_loads_keeps_few_copies(layer, monkeypatch, tmp_path):
     """However many loads there are; a load between two of them, whose copy has ended, is the same to the bit."""
@@ -144,6 +146,7 @@ def test_windows_of_spheres_are_those_of_all_eigenvalues(spheres):
             assert pairs(path(load)) == inside
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_where_drag_leaves_it(lammps_with, tmp_path):
     """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact."""

@@ -45,6 +45,7 @@ OFTEN = ("aveforce, sideways held", "rigid, pushed by a later fix")
 ALL = [each if each in OFTEN else pytest.param(each, marks=pytest.mark.long) for each in LIDS]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lid", ALL)
 def test_a_lid_moves_as_one(cell, tmp_path, lid):
     lmp = cell(LIDS[lid])
@@ -77,6 +78,7 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
 CORNERS = [(x, y) for x in (0, 1) for y in (0, 1)]
 
 
+@pytest.mark.long
 def test_a_grain_between_two_bodies_of_one_fix(lammps_with):
     """fix rigid moves the particles of its bodies alone, whatever its own group is; a body that keeps its place is as
     frozen particles, but for dashpots, which feel its mass."""

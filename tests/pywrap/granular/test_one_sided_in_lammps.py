@@ -82,6 +82,7 @@ def compare(lmp, here, times, dt, size=PUSH, agrees=AGREES):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", SMALL)
 def test_few_disks_after_a_push(small, law):
     """1 % is ten times what was measured."""

@@ -52,6 +52,7 @@ def compared(packing, push, times, agrees):
     return found, expected
 
 
+@pytest.mark.long
 def test_the_standard_law_after_a_push(layer):
     """Dashpots of the plugin feel the velocity of the full step, and those of one-sided motion that of the half step:
     1 % of D."""

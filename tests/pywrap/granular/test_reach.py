@@ -44,6 +44,7 @@ def turned(here, matrix):
     return derive_frozen(here, contacts=contacts, load=load, box=here.box @ matrix.T, position=position)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "d"), BEDS)
 def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
     _, here = bed(law, d)
@@ -60,6 +61,7 @@ def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
             assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "d"), BEDS)
 def test_every_push_within_the_range_moves_lammps_as_the_linear_packing(bed, law, d):
     """Of one particle, and of all in random directions: D is the same within 2 %."""
