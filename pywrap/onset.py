@@ -153,10 +153,8 @@ def onset_run(
                 failure: Any = NoGrowthError if undamped else OnsetError
                 raise failure(error.finding, "raise ramp.until", error.finer, **damped_alone) from error
             what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
-            finding = (
-                f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
-                "flows before an onset"
-            )
+            finding = f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond"
+            finding += ": the packing flows before an onset"
             raise (NoGrowthError if undamped else NoEquilibriumError)(finding, **damped_alone) from error
         equilibria, near = tuple(path.equilibria), [] if near_onset is None else (found.fx_c + near_onset).tolist()
         between = {fx: path(fx) for fx in near if 0 <= fx <= equilibria[-1].fx}

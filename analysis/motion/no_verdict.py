@@ -20,7 +20,5 @@ def no_verdict(configuration: Configuration) -> Iterator[str]:
             "and K by differences of forces is the mean of both"
         )
     if not in_balance(configuration):
-        yield (
-            f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
-            f"the largest force of a contact or a wall {configuration.largest_force:.3g}"
-        )
+        largest = f"the largest force of a contact or a wall {configuration.largest_force:.3g}"
+        yield f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, {largest}"

@@ -116,9 +116,8 @@ def motion_under_load(
     loaded = c.coordinate_free & (direction[:, 0] != 0)
     loaded[system.motion.active] = False
     if flying := len(np.unique(np.flatnonzero(loaded) % len(c))):
-        raise NotFollowedError(
-            f"the load accelerates {counted(flying, 'particle')} that nothing touches: give no forces on these"
-        )
+        alone = f"{counted(flying, 'particle')} that nothing touches"
+        raise NotFollowedError(f"the load accelerates {alone}: give no forces on these")
     velocity = _steady_velocity(system, load, free) if decays and not len(system.missing) else None
     if velocity is None:
         span, found = _followed(system, load, time)
@@ -135,10 +134,8 @@ def motion_under_load(
     least = max(reached, PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0)
     if change is not None and least >= change:
         what = "contacts counted as at Coulomb's bound reach it" if reached == least else "residual forces count less"
-        raise NotFollowedError(
-            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
-            "bring the packing to rest more closely"
-        )
+        before = f"another contact {event} before, at {change:.1g}: bring the packing to rest more closely"
+        raise NotFollowedError(f"{what} once the load has risen by {least:.1g}, and {before}")
     return FieldsByName(**found, least_rise=least, next_change=change, next_event=event)
 
 
@@ -300,8 +297,7 @@ def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: NDArray[
     a = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
     moves = static_response(replace(system.motion, stiffness=a), load, 1)
     if np.linalg.norm(load - a @ moves) > 1e-6 * np.linalg.norm(load):
-        raise NotFollowedError(
-            "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
-        )
+        turned = "the load turns the forces of contacts at Coulomb's bound"
+        raise NotFollowedError(f"{turned}, and nothing holds the particles that slide then")
     size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
     return float(0.1 * np.sqrt(size / change)) if change else np.inf

@@ -44,10 +44,7 @@ from .verdict import Stability
 LARGE = 6000
 """Coordinates beyond which one push and its opposite stand for several, and K's spectrum is not computed."""
 
-UNSETTLED = (
-    "its residual forces alone take a contact to Coulomb's bound, open or close one: bring the packing to rest more "
-    "closely"
-)
+UNSETTLED = "its residual forces alone take a contact to Coulomb's bound, open or close one: bring it closer to rest"
 """Why there is no verdict where the residual forces alone change a contact."""
 
 

@@ -178,10 +178,8 @@ class Stability:
             later = "" if creep.settled else ", and farther later"
             if not creep.settled and creep.limit is not None:
                 later = f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
-            yield (
-                f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
-                f"of the push within t = {creep.time:.4g}{later}"
-            )
+            times = f"{creep.amplification:.2g} times the mean square velocity of the push within t = {creep.time:.4g}"
+            yield f"{WORN}, and they stay displaced, by D up to {times}{later}"
         elif self.stable and creep is not None:
             known = as_known(creep.least_velocity, creep.velocity)
             yield f"{WORN}: D as ({known} t)^2 times the mean square velocity of the push"
@@ -203,18 +201,14 @@ class Stability:
                     f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
                 )
         elif self.stable and most is not None and least >= most:
-            yield (
-                f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
-                f"{most:.1g} a contact may open, close or slide"
-            )
+            above = f"above {most:.1g} a contact may open, close or slide"
+            yield f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and {above}"
         elif self.stable and most is not None:
             below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
             within = f", until t = {self.push_time:.3g}" if self.push_time else ""
-            yield (
-                f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
-                f"{within}: no contact opens, closes or slides{worn}{below}"
-            )
+            pushes = f"every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
+            yield f"holds for {pushes}{within}: no contact opens, closes or slides{worn}{below}"
         elif self.stable and not self.asymmetry:
             above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
             says = "which push changes a contact, K by differences of forces does not say"

@@ -244,18 +244,14 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
         elif style in BODIES:  # it moves the particles of its bodies alone, whatever its own group is
             for group, along in translating_bodies(lines[name], dimension).items():
                 body = members[f"{name} {group}"]
-                moves[:3, body], leader[:3, body], felt[body] = (
-                    along[:, None],
-                    np.flatnonzero(body)[:1],
-                    mass[body].sum(),
-                )
+                moves[:3, body], leader[:3, body] = along[:, None], np.flatnonzero(body)[:1]
+                felt[body] = mass[body].sum()
         for k, word in enumerate(words[:3] if style in order[:2] else ()):
             if word == "NULL":
                 continue
             if "v_" in word or (style == "setforce" and float(word) != 0.0):
-                raise NotTakenError(
-                    f"fix {name} {style} drives particles by the force {word}: use 0.0 or NULL, and fix addforce."
-                )
+                says = f"drives particles by the force {word}: use 0.0 or NULL, and fix addforce."
+                raise NotTakenError(f"fix {name} {style} {says}")
             if style == "setforce":
                 moves[k, here] = False
             else:

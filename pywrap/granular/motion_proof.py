@@ -137,9 +137,8 @@ def _least_difference(lmp: Any, c: Configuration, timestep: float, count: int) -
         """Of the changes of velocities from 1, -1 and 0 times the start, in the mixtures of the columns."""
         starts = amplitude * np.outer(start, [1.0, -1.0, 0.0][: len(mix)])
         ends = np.column_stack([steps_in_a_copy(lmp, c, v, timestep, count) for v in starts.T])
-        seen, expected = (
-            weight * ((each - starts) @ mix) for each in (ends, _linear_steps(c, starts, timestep, count))
-        )
+        both = ends, _linear_steps(c, starts, timestep, count)
+        seen, expected = (weight * ((each - starts) @ mix) for each in both)
         return float((np.linalg.norm(seen - expected, axis=0) / np.linalg.norm(expected, axis=0)).max())
 
     # the rounding of a displacement is some units in the last place of the largest coordinate; roundings over the

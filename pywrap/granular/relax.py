@@ -171,9 +171,8 @@ def bring_to_rest(
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
             if way > far * diameter:
-                raise NoEquilibriumError(
-                    f"The packing flows{where}: its particles have moved by {counted(round(far), 'diameter')}."
-                )
+                moved = counted(round(far), "diameter")
+                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
             ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
             rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
     finally:
@@ -196,11 +195,8 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
-        raise NotTakenError(
-            f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
-            "it, and set `timer timeout unlimited`."
-        )
+        cure = "as fix halt and timer timeout do: unfix it, and set `timer timeout unlimited`."
+        raise NotTakenError(f"LAMMPS ended a run while the packing came to rest{where}, {cure}")
     if lost := count - lmp.extract_setting("nlocal"):
-        raise NoEquilibriumError(
-            f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete it, or take walls."
-        )
+        gone = f"{counted(lost, 'particle')} left the box while the packing came to rest{where}"
+        raise NoEquilibriumError(f"{gone}: delete it, or take walls.")

@@ -144,9 +144,8 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
     """Have LAMMPS carry out a deck in its folder: the instance, whose files are closed; the commands that it has
     carried out, in words; and why it stopped, if an error has ended the deck."""
     here, carried_out, stopped, complete = os.getcwd(), list[list[str]](), "", False
-    told = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))(
-        lambda number, words: carried_out.append([os.fsdecode(word) for word in words[:number]])
-    )
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
+    told = kind(lambda number, words: carried_out.append([os.fsdecode(word) for word in words[:number]]))
     os.chdir(path.parent)
     try:
         try:

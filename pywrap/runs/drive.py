@@ -208,10 +208,8 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     slowest = nearest_modes(start, 0.0, 1).values.real.min()
     loading = bears / (spring * fastest)
     periods = loading * math.sqrt(max(slowest, np.finfo(float).tiny)) / (2 * math.pi)
-    says = (
-        f"drive.velocity = {fastest:g} loads the layer to mu F_y in {loading:.3g}, which is {periods:.2g} periods of "
-        f"its slowest vibration"
-    )
+    within = f"{loading:.3g}, which is {periods:.2g} periods of its slowest vibration"
+    says = f"drive.velocity = {fastest:g} loads the layer to mu F_y in {within}"
     needs = f"slow driving takes {LEAST_LOADING_PERIODS:g} or more"
     if periods < REFUSED_LOADING_PERIODS:
         slow = fastest * periods / LEAST_LOADING_PERIODS

@@ -111,10 +111,8 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
     if not isinstance(section, GeneratedPacking):
         packing = _in_arithmetic(section.packing(law, **load_of(scene)), scene.precision)
         if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
-            raise SceneError(
-                f"{section.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
-                f"fy = {scene.load.fy:g}: {CHECK_LOAD}"
-            )
+            feels = f"a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}"
+            raise SceneError(f"{section.file}: the packing is not in balance, {feels}: {CHECK_LOAD}")
         return packing
     kn, fy, at = law.kn, scene.load.fy, section.settle_at
     if at is not None:

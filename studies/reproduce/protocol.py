@@ -172,10 +172,8 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> dict[str, Any]:
     candidates = [(each, spectrum(each.packing)) for each in run.equilibria if each.fx > run.fx_c]
     start, modes = max(candidates, key=lambda each: dominance(each[1]))
     if not dominance(modes):
-        raise SceneError(
-            f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
-            f"F_x = {run.fx_c:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
-        )
+        none = f"no load of the ramp lies in a window of complex eigenvalues, the first begins at F_x = {run.fx_c:.6g}"
+        raise SceneError(f"{none}: take a smaller ramp.step, so that a run above the onset has where to start")
     dt = time_step(start.packing)
     predicted = modes.growth_rate(dt)
     length = min(EFOLDS / predicted, MOST_RUN_STEPS * dt)
@@ -216,10 +214,8 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and weakened[0].windows[0].kind != "start" and fx <= weakened[0].fx_c:
-        return (
-            f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
-            "window between the two, and nothing to erupt."
-        )
+        lower = f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too"
+        return f"{lower}: no window between the two, and nothing to erupt."
     *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
     packing = start.packing
     modes = spectrum(packing)
