@@ -197,7 +197,5 @@ def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> floa
     weakened = onset_for(mu * scene.friction.mu_ss).fx_c
     if weakened < first.fx_onset:
         return 0.5 * (weakened + first.fx_onset)
-    raise SceneError(
-        f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the weakened "
-        f"friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
-    )
+    two = f"F_x^c = {weakened:.6g} with the weakened friction does not lie below F_x^c = {first.fx_onset:.6g}"
+    raise SceneError(f"perturb.fx is missing, and there is no load between two onsets: {two}. Give perturb.fx")

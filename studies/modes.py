@@ -193,13 +193,9 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
 def load_row(packing: Packing) -> dict[str, Any]:
     """The numbers of one load of the task "modes"."""
     found = count_pairs(packing)
-    row = found.as_dict() | {
-        "modes": found.modes,
-        "contacts": len(packing.contacts),
-        "sliding": int(np.count_nonzero(packing.sliding)),
-        "rattlers": len(packing.rattlers),
-        "bound": antisymmetric_norm(packing),
-    }
+    row = found.as_dict() | {"modes": found.modes, "contacts": len(packing.contacts)}
+    row |= {"sliding": int(np.count_nonzero(packing.sliding)), "rattlers": len(packing.rattlers)}
+    row |= {"bound": antisymmetric_norm(packing)}
     if len(found.omega):
         value = found.omega[0] ** 2
         pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)

@@ -197,11 +197,10 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
     # and of particles that nothing bears as its square
     first, last = len(windows) - np.array([0.875, 0.125]) * len(after)
     if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** 0.5 * quarters[0]:
-        raise NotFollowedError(
-            f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
-            f"{quarters[-1]:.3g} within t = {now:.4g}, as where the load accelerates particles whose contacts slide "
-            "on, or where the packing is slower than that: give more time"
-        )
+        rises = f"rises from {quarters[0]:.3g} to {quarters[-1]:.3g} within t = {now:.4g}"
+        where = "where the load accelerates particles whose contacts slide on, or the packing is slower than that"
+        says = f"no constant drift is seen: the mean velocity over the rate {rises}"
+        raise NotFollowedError(f"{says}, as {where}: give more time")
     span, (one, *others) = _of_starts(system, windows)
     whole: Window = tuple(sum(each) for each in zip(*span, strict=True))
     return whole, {**one, "time": now, "span": whole[0], "other_start": others[0] if others else None}

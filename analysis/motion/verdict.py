@@ -139,11 +139,10 @@ class Stability:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
             size = as_known(outcome.least_amplification, outcome.amplification)
-            return (
-                f"stable: each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square "
-                f"velocity of the push while contacts slide (followed for t = {outcome.time:.4g}{left})"
-                + (f"; with sticking contacts, {said}" if said else "")
-            )
+            stuck = f"; with sticking contacts, {said}" if said else ""
+            reaches = f"D reaches {size} times the mean square velocity of the push while contacts slide"
+            followed = f"(followed for t = {outcome.time:.4g}{left})"
+            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {reaches} {followed}{stuck}"
         if said:
             return f"stable: {said}{free}"
         if self.dissipative and self.growth_rate < 0:
@@ -168,10 +167,9 @@ class Stability:
             if sided:
                 on = max(self.sliding.free - self.sticking.free, 0)
                 ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""
-                yield (
-                    f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
-                    f"slid on, {ever}{_neighbour(self.sliding)}"
-                )
+                slid = f"if all slid on, {ever}{_neighbour(self.sliding)}"
+                stuck = f"if all of them stuck, {_neighbour(self.sticking)}"
+                yield f"neither of two linear motions decides: {stuck}; {slid}"
         if self.stable and self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
         if self.stable and creep is not None and self.dissipative:
@@ -190,10 +188,9 @@ class Stability:
         if outcome is not None:
             least, most = outcome.scales
             if outcome.grows and np.isfinite(least):
-                yield (
-                    f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
-                    "ones contacts that count as at the bound may stay below it, or residual forces count"
-                )
+                smaller = "contacts that count as at the bound may stay below it, or residual forces count"
+                after = f"pushes from {least:.1g} on (velocity along an axis)"
+                yield f"this growth is seen after {after}: after smaller ones {smaller}"
             elif self.stable and least < most:
                 yield (
                     f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where "

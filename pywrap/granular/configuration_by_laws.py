@@ -148,11 +148,8 @@ def _linearise_measured(
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
     inverse = 1 / mass[i] + 1 / mass[j]
     of_pair = np.divide(1.0, inverse, out=0.0 * inverse, where=inverse > 0)
-    of_state = (
-        np.where(wall, arms[:, 0], arms.prod(axis=1) / arms.sum(axis=1)),
-        overlap,
-        np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], of_pair),
-    )
+    radius = np.where(wall, arms[:, 0], arms.prod(axis=1) / arms.sum(axis=1))
+    of_state = radius, overlap, np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], of_pair)
     stiffness, lever = (1 + law["stiffness"].overlap) * fn / overlap, law["lever"]
     _agree(law["stiffness"].at(*of_state) * overlap, stiffness, contacts)
     sticks = LinearisedContacts(

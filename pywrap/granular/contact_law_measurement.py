@@ -82,11 +82,9 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
     first = state._replace(overlap=min(max(state.overlap, least), most))
-    others = (
-        first._replace(overlap=0.5 * first.overlap),
-        first._replace(masses=(3 * first.masses[0], 2 * first.masses[1])),
-        first._replace(radii=(0.5 * first.radii[0], 0.8 * first.radii[1])),
-    )
+    heavier, smaller = (3 * first.masses[0], 2 * first.masses[1]), (0.5 * first.radii[0], 0.8 * first.radii[1])
+    changes = ({"overlap": 0.5 * first.overlap}, {"masses": heavier}, {"radii": smaller})
+    others = tuple(first._replace(**change) for change in changes)
     try:
         bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
     except Exception as error:  # whatever LAMMPS says of the commands

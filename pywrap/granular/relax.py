@@ -139,10 +139,9 @@ def bring_to_rest(
             if done == STEPS_WITHOUT_GAIN:
                 found = look()
                 if dt > (limit := float(stable_timestep(found))):
-                    raise NoEquilibriumError(
-                        f"The packing vibrates{where} and cannot come to rest: its time step {dt:.4g} is longer than "
-                        f"the largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
-                    )
+                    largest = f"the largest stable one, {limit:.4g}, of its contacts with their dashpots"
+                    longer = f"its time step {dt:.4g} is longer than {largest}; take a shorter one."
+                    raise NoEquilibriumError(f"The packing vibrates{where} and cannot come to rest: {longer}")
                 # nothing comes closer than the rounding of a coordinate, times the stiffest contact
                 stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
                 rounding = FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
@@ -178,11 +177,10 @@ def bring_to_rest(
     finally:
         for name in drags.keys() & set(lmp.available_ids("fix")):
             lmp.command(f"unfix {name}")
-    raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
-        f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
-        "steps, or the packing creeps or flows."
-    )
+    share = f"{residual / (force or 1.0):.2g} of the mean contact force is out of balance"
+    moved = f"its particles have moved by {way / diameter:.2g} diameters"
+    says = f"The packing does not come to rest{where} in {steps} steps: {share}, and {moved}"
+    raise NoEquilibriumError(f"{says}; give more steps, or the packing creeps or flows.")
 
 
 def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:

@@ -299,10 +299,9 @@ def drive(
             energy, at_bound = motion.kinetic_energy(start), int(np.count_nonzero(packing.sliding))
             sample = DriveSample(time, force, displacement, thickness, energy, at_bound)
             if thickness > 1.5 * height:
-                raise FaultgougeError(
-                    f"the upper layer has left the bed at t = {time:g}: its mean height is {thickness:.3g}, and was "
-                    f"{height:.3g}; take a slower drive, a softer spring or a larger load.fy"
-                )
+                left = f"the upper layer has left the bed at t = {time:g}"
+                rise = f"its mean height is {thickness:.3g}, and was {height:.3g}"
+                raise FaultgougeError(f"{left}: {rise}; take a slower drive, a softer spring or a larger load.fy")
             slip = ended(sample)
             under_way = detector.so_far if detector else None
             slips += slip is not None

@@ -131,11 +131,10 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
         if len(idle) <= 0.5 * len(packing):
             break
     else:
-        raise NoEquilibriumError(
-            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {len(idle)} of "
-            f"{len(packing)} disks carry nothing: without friction only a layer that closes the box stays on top, so "
-            f"{MORE_IN_LAYER}"
-        )
+        sank = f"the upper layer sank through the bed from each of {STARTS} loose starts"
+        why = "without friction only a layer that closes the box stays on top"
+        sank += f", and {len(idle)} of {len(packing)} disks carry nothing"
+        raise NoEquilibriumError(f"{sank}: {why}, so {MORE_IN_LAYER}")
     if not own.settle_friction:
         packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
     wanted = own_units(section, law, scene.load.fy)[2]
