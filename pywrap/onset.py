@@ -182,19 +182,9 @@ def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> floa
     that is narrower. With friction that weakens, a run shows triggering between two onsets: the packing is stable with
     the static friction, and unstable with the weakened one. The run then begins in the middle between the two.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a section [ramp], in whose range onsets are sought.
-    known : dict, optional
-        Onsets of the scene that have been found already, by friction coefficient.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no section [ramp], or the weakened friction has no earlier onset.
-    OnsetError
-        If no pair becomes complex up to the ramp's end.
+    `known` has onsets of the scene that have been found already, by friction coefficient. Raises SceneError if the
+    scene has no section [ramp], or the weakened friction has no earlier onset, and OnsetError if no pair becomes
+    complex up to the ramp's end.
     """
     ramp, mu = require_section(scene.ramp, "ramp"), scene.law.mus[0]
 

@@ -82,17 +82,9 @@ class Border(NamedTuple):
 class Slice:
     """A run of neighbouring eigenvalues.
 
-    Attributes
-    ----------
-    first : int
-        Number in the whole spectrum of the first of `values`.
-    values : ndarray, shape (M,)
-        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
-        out in the margins are not converged.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        Which of the M belong to this slice and to no other.
+    `values` (M,) increase: those of a margin, of which the outer ones are not converged, the slice's `own` ones, and
+    those of another margin; `vectors` (E, M) has their orthonormal eigenvectors. `first` is the number of the first of
+    `values` in the whole spectrum.
     """
 
     first: int

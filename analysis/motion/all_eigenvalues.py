@@ -48,28 +48,14 @@ class SpectrumError(FaultgougeError):
 
 
 def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple[Complexes, Modes]:
-    """All eigenvalues of a sparse matrix that is nearly symmetric.
+    """All eigenvalues of a sparse matrix that is nearly symmetric, such as M^(-1/2) K M^(-1/2) of the coordinates that
+    feel a force.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        A, such as M^(-1/2) K M^(-1/2) of the coordinates that feel a force; its pattern is symmetric.
-    own : int
-        Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors.
-    least : int
-        Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time.
+    A slice has `own` eigenvalues: more cost more orthogonalisation, fewer cost more factors. LAPACK finds all of up to
+    `least` coordinates, which a space of the largest size would hold, in no less time.
 
-    Returns
-    -------
-    values : ndarray of complex, shape (n,)
-        Sorted by real part, then imaginary part.
-    marked : Modes
-        Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
-
-    Raises
-    ------
-    SpectrumError
-        If not all are found.
+    Returns the values, sorted by real part, then imaginary part, and the modes of those with a positive imaginary part,
+    of those that are real and negative, and of real ones that are oblique. Raises SpectrumError if not all are found.
     """
     count, island = connected_components(matrix, directed=False)
     values, parts = [], []

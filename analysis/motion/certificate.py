@@ -70,17 +70,9 @@ class NoProofError(Exception):
 def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
     """What is proved of all motion: that no fast motion grows, and what slow motions do.
 
-    Parameters
-    ----------
-    stiffness, damping : scipy.sparse.csr_array, shape (n, n)
-        A and G, particle by particle, without motions of one particle that no force opposes.
-    zero : float
-        Uncertainty of an eigenvalue of zero of A, 1 / time^2.
-
-    Raises
-    ------
-    NoProofError
-        If there is no certificate, or too many motions are slow.
+    `stiffness` and `damping` are A and G, particle by particle, without motions of one particle that no force opposes;
+    `zero` is the uncertainty of an eigenvalue of zero of A, 1 / time^2. Raises NoProofError if there is no certificate,
+    or too many motions are slow.
     """
     order = np.argsort(elimination_places(csc_array(abs(stiffness) + abs(damping))))
     s, n = (csr_array(0.5 * (stiffness + sign * stiffness.T))[order][:, order] for sign in (1, -1))

@@ -33,15 +33,7 @@ from .granular_commands import (
     unmeasured_laws,
 )
 from .lammps_arrays import by_id, owned_array
-from .look_in_a_copy import (
-    DRAG_STYLES,
-    INSERTS,
-    PER_STEP,
-    OpenFile,
-    log_file,
-    quieten,
-    styles_of,
-)
+from .look_in_a_copy import DRAG_STYLES, INSERTS, PER_STEP, OpenFile, log_file, quieten, styles_of
 
 Arrays = dict[str, Any]
 

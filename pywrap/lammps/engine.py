@@ -38,17 +38,9 @@ MOST_STEPS_OF_DYNAMICS = 10_000_000
 
 @dataclass(frozen=True)
 class Relaxation:
-    """How a relaxation ended.
-
-    Attributes
-    ----------
-    residual : float
-        Largest force, with torque over radius, on a disk.
-    status : {"yes", "floor", "no"}
-        Whether the tolerance was reached, or the rounding of the coordinates, or neither.
-    steps : int
-        Time steps, that is force evaluations.
-    """
+    """How a relaxation ended: the largest force, with torque over radius, on a disk, whether the tolerance was reached
+    ("yes"), or the rounding of the coordinates ("floor"), or neither ("no"), and the time steps, that is force
+    evaluations."""
 
     residual: float
     status: str

@@ -353,20 +353,11 @@ def slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
 
 
 def clock_advance(path: Path, other: Path) -> float | None:
-    """How much earlier the next slip after a signal begins than in another run without the signal, time.
+    """How much earlier the next slip after a signal begins, in the drive.h5 `path`, than in that of the same scene
+    without the signal, `other`; None if one of the two has no slip after the signal has begun.
 
     Slips whose force drop is below `COMPARABLE` of that of the next slip without the signal are left out: a strong
     signal makes small slips at once, which leave the next large one where it was.
-
-    Parameters
-    ----------
-    path, other : Path
-        A drive.h5 with a signal, and the drive.h5 of the same scene without the signal.
-
-    Returns
-    -------
-    float or None
-        None if one of the two has no slip after the signal has begun.
     """
     with RunFile(path) as with_signal, RunFile(other) as without:
         settings = drive_of(with_signal)

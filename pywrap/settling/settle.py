@@ -185,20 +185,7 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     the scene has: radii, width and F_y are rounded to `DIGITS` when they are converted, so that two scenes that differ
     in their units alone settle the same numbers. A scene that has these units already settles its numbers as they are.
     Numbers of more than `DIGITS` digits, such as a width of sqrt(2), therefore settle otherwise in other units.
-
-    Parameters
-    ----------
-    packing : GeneratedPacking
-        Radii and width in the scene's length.
-    law : MindlinLaw
-        In the scene's force / length^exponent.
-    fy : float
-        The scene's force.
-
-    Returns
-    -------
-    GeneratedPacking, MindlinLaw, float
-        The same in the packing's units. Dashpots are left out: settling has a damping of its own.
+    Dashpots are left out: settling has a damping of its own.
     """
     length, stiffness = 2 * min(packing.radii), SETTLING_STIFFNESS.get(law.exponent, SETTLING_STIFFNESS[1.5])
     undamped = replace(law, cn=0.0, ct=0.0)

@@ -42,21 +42,8 @@ MOST_POINTS = 1_000_000
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One scene of a sweep.
-
-    Attributes
-    ----------
-    number : int
-        Its place in the sweep.
-    values : dict
-        The swept keys and their values.
-    scene : Scene or None
-        None if the values make no scene.
-    says : str or None
-        Why not.
-    key : str
-        Sixteen hexadecimal digits that stand for task, version and scene.
-    """
+    """One scene of a sweep: its `number` in the sweep, the `values` of the swept keys, and the scene, or why the values
+    make none, `says`. `key` is sixteen hexadecimal digits that stand for task, version and scene."""
 
     number: int
     values: dict[str, Any]

@@ -113,12 +113,7 @@ def _spheres(
 ) -> Results:
     """Store spheres of a table with the forces of their contacts, and give the verdict that the digits allow."""
     from faultgouge.analysis.files.configuration_file import write_configuration
-    from faultgouge.analysis.files.contact_tables import (
-        material_of,
-        of_material,
-        read_contacts,
-        verdict_within_digits,
-    )
+    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_contacts, verdict_within_digits
     from faultgouge.analysis.files.formats import read_particles
     from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
 
