@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from table_rows import rows_of
 
 from faultgouge.analysis import (
     BadInputError,
@@ -233,20 +234,7 @@ def test_a_slider_takes_force_times_slip():
     assert lost.total[-1] == pytest.approx(told, rel=1e-9, abs=0)
 
 
-@pytest.mark.parametrize(
-    ("given", "word"),
-    [
-        ({"young": 1.0, "kn": 2.0}, "not both"),
-        ({}, "needs young"),
-        ({"young": -1.0}, "young = -1"),
-        ({"young": 1.0, "poisson": 0.6}, "poisson = 0.6"),
-        ({"young": 1.0, "restitution": 0.0}, "restitution = 0"),
-        ({"young": 1.0, "friction": -0.1}, "friction = -0.1"),
-        ({"kn": 1.0, "exponent": 1.2}, "exponent = 1.2"),
-        ({"young": np.nan}, "young = nan"),
-        ({"young": 1.0}, "how heavy"),
-    ],
-)
+@pytest.mark.parametrize(("given", "word"), rows_of("analysis/refused_materials.txt"))
 def test_what_no_material_has_is_named(given, word):
     with pytest.raises(BadInputError, match=word):
         spheres_of_material([[0.0, 0.0, 0.0]], [0.5], Material(**given))

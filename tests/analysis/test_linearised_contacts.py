@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from packing_snapshot import snapshot_of
 from scipy.linalg import block_diag, expm
+from table_rows import rows_of
 
 from faultgouge.analysis import (
     BadInputError,
@@ -298,25 +299,7 @@ def one_contact(**change):
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"normal": [[0, 2, 0]]}, r"Contact 0: the normal .* is no unit vector"),
-        ({"normal": [[0, 0, 0]]}, r"no unit vector"),
-        ({"normal": [[0, 0.8, 0.6]]}, r"normal .* of disks is not in the plane"),
-        ({"tangential_force": [[0.1, 0, 0.1]]}, r"tangential force .* on a disk is not in the plane"),
-        ({"tangential_force": [[0, 0.1, 0]]}, r"has a part along the normal"),
-        ({"distance": [-1]}, r"the distance -1.0 is not positive"),
-        ({"slip_arm": [[0.5, -0.5]]}, r"slip_arm = .* is negative"),
-        ({"lever_arm": [[-0.5, 0.5]]}, r"lever_arm = .* is negative"),
-        ({"friction": [-0.5]}, r"friction = -0.5 is negative"),
-        ({"friction": [0.5 + 1j]}, r"friction holds complex values"),
-        ({"i": [-3]}, r"i = -3 is no particle"),
-        ({"j": [-2]}, r"j = -2 is no particle; -1 is a wall"),
-        ({"mass": [1 + 1j, 1]}, r"mass holds complex values"),
-        ({"mass": np.ma.masked_array([1.0, 1.0], [True, False])}, r"mass holds masked values"),
-        ({"ids": [7, 7]}, r"Two particles have the ID 7"),
-        ({"kind": [1]}, r"kind must be a list of 2 integers"),
-    ],
+    ("change", "says"), rows_of("analysis/refused_configurations.txt", masked_array=np.ma.masked_array)
 )
 def test_values_that_no_packing_has(change, says):
     with pytest.raises(ValueError, match=says) as refusal:

@@ -7,6 +7,7 @@ import pytest
 import quasistatic
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from table_rows import rows_of
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, solid_fraction, touching
 
@@ -54,42 +55,13 @@ def test_a_packing_is_frozen(cluster):
     assert moved == cluster
 
 
-@pytest.mark.parametrize(
-    ("i", "j", "slip", "says"),
-    [
-        ([0, 1], [1], [0, 0], "2 integers"),
-        ([0], [1], [np.nan], "finite"),
-        ([-1], [1], [0], "negative"),
-        ([0], [-2], [0], "negative"),
-        ([2], [2], [0], "itself"),
-        ([0, 1], [1, 0], [0, 0], "twice"),
-        ([0, 0], [-1, -1], [0, 0], "twice"),
-        ([0.5], [1], [0], "integers"),
-    ],
-)
+@pytest.mark.parametrize(("i", "j", "slip", "says"), rows_of("analysis/refused_contacts.txt"))
 def test_impossible_contacts(i, j, slip, says):
     with pytest.raises(ValueError, match=says):
         Contacts(i, j, slip)
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"position": [[0, 0]]}, "shape"),
-        ({"position": np.full((6, 2), np.nan)}, "finite"),
-        ({"radius": [1, 1, 1, 1, 1, -1]}, "positive"),
-        ({"mass": [1, 1, 1, 1, 1, 0]}, "positive"),
-        ({"angle": [0.0]}, "shape"),
-        ({"top": [0, 1, 2]}, "booleans"),
-        ({"top": [True]}, "booleans"),
-        ({"inertia_factor": 0.0}, "inertia_factor"),
-        ({"box_length": -1.0}, "box_length"),
-        ({"box_length": 1.99}, "two largest diameters"),
-        ({"fx": np.inf}, "fx"),
-        ({"contacts": Contacts([0], [6], [0.0])}, "beyond"),
-        ({"position": [[0, 1]] * 6}, "same centre"),
-    ],
-)
+@pytest.mark.parametrize(("change", "says"), rows_of("analysis/refused_packings.txt", Contacts=Contacts))
 def test_impossible_packings(cluster, change, says):
     with pytest.raises(ValueError, match=says):
         _ = replace(cluster, **change).geometry

@@ -1,6 +1,7 @@
 """Rescaled slips, and Coulomb's slider: LAMMPS against the law, against LAMMPS's own style, and growth."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,27 +79,7 @@ def test_a_slider_keeps_its_force_while_pressed_and_loses_it_in_proportion_while
     assert forces[3] == pytest.approx(-KN * 1e-5**1.5, rel=1e-10)  # an overlap of 1e-5 is known to 4e-11
 
 
-SCRIPT = """
-units           lj
-dimension       2
-boundary        f f p
-atom_style      sphere
-atom_modify     map yes
-comm_modify     vel yes
-region          box block -5 5 -5 5 -0.5 0.5
-create_box      1 box
-create_atoms    1 single 0.0 0.0 0.0
-create_atoms    1 single 0.0 0.999 0.0
-set             group all diameter 1.0
-neigh_modify    delay 0 every 1
-{style}
-timestep        {dt}
-group           upper id 2
-compute         each all property/atom fx
-compute         force upper reduce sum c_each
-thermo_style    custom step c_force
-thermo          0
-"""
+SCRIPT = Path(__file__).with_name("inputs").joinpath("two_disks.in").read_text()
 LEG = """
 set             group all omega 0.0 0.0 {spin}
 fix             move upper move linear 0.0 {speed} 0.0

@@ -13,56 +13,15 @@ from faultgouge.analysis import MindlinLaw
 
 HEADERS = Path(__file__).parents[2] / "pair_mindlin_smooth"
 
-SQUARE = """
-  static constexpr double EXPONENT = 2.0;
-  static double growth(double overlap) { return overlap; }
-  static double force(double kn, double overlap) { return kn * overlap * overlap; }
-  static Compensated force(double kn, Compensated overlap) { return kn * (overlap * overlap); }
-  static double lost(double share) { return share; }
-"""
-
-PROGRAM = """
-#include "mindlin_law.h"
-#include <cstdio>
-
-using namespace faultgouge;
-
-struct Square {%s};
-
-// what the plugin asks of each power of its list, beside what the path below does
-const double ASKED = PowerList<Square>::at(0, [](auto p) { return p.EXPONENT + p.growth(1.0); });
-
-// legs of a path: overlap and increment of the slip, in small steps; prints slip, force and work at their ends
-int main()
-{
-  using P = Square;
-  MindlinLaw law;
-  law.kn = 2e6, law.kt = 6e5, law.mu = 0.8, law.history = History::COULOMB;
-  double overlap = 1e-3, slip = 0.0, work = 0.0, to, increment;
-  const int STEPS = 20000;
-  while (std::scanf("%%lf %%lf", &to, &increment) == 2) {
-    const double change = (to - overlap) / STEPS, step = increment / STEPS;
-    for (int k = 0; k < STEPS; k++) {
-      double limit = law.slip_limit_ratio<double>() * overlap;
-      const double before = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-      overlap += change;
-      limit = law.slip_limit_ratio<double>() * overlap;
-      slip = advanced_slip(slip, rescaled_increment<P>(slip, step, change, overlap), limit);
-      const double after = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-      work -= 0.5 * (before + after) * step;
-    }
-    const double limit = law.slip_limit_ratio<double>() * overlap;
-    const double force = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-    std::printf("%%.17g %%.17g %%.17g\\n", slip, force, work);
-  }
-}
-"""
+INPUTS = Path(__file__).with_name("inputs")
+SQUARE = (INPUTS / "square.h").read_text()
 
 
 def compiled(folder, members):
     """The program with some members of the struct, or what the compiler says."""
-    (folder / "path.cpp").write_text(PROGRAM % members)
-    command = ["c++", "-std=c++17", "-O1", f"-I{HEADERS}", str(folder / "path.cpp"), "-o", str(folder / "path")]
+    (folder / "square.h").write_text(members)
+    (folder / "path.cpp").write_bytes((INPUTS / "law_path.cpp").read_bytes())
+    command = ["c++", "-std=c++17", "-O1", f"-I{HEADERS}", folder / "path.cpp", "-o", folder / "path"]
     return subprocess.run(command, capture_output=True, text=True)
 
 
@@ -78,9 +37,8 @@ def test_another_exponent(tmp_path, monkeypatch):
     for start in np.linspace(-1.6e-3, 1.6e-3, 9):
         path = [(1e-3, start), *CLOSED, (1e-3, -start)]
         words = "\n".join(f"{overlap} {increment}" for overlap, increment in path)
-        rows = np.array(
-            subprocess.run([tmp_path / "path"], input=words, capture_output=True, text=True).stdout.split(), dtype=float
-        ).reshape(-1, 3)
+        printed = subprocess.run([tmp_path / "path"], input=words, capture_output=True, text=True).stdout
+        rows = np.array(printed.split(), dtype=float).reshape(-1, 3)
         assert len(rows) == len(path)
         assert rows[-1, 2] >= 0
         monkeypatch.setattr("faultgouge.analysis.packing.law.EXPONENTS", (2.0,))
