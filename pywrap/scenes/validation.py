@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar, get_args
 
@@ -29,7 +29,6 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from ...analysis import BadInputError
 from ...analysis.arrays import LARGEST, SMALLEST
 from ...analysis.files.atomic_write import read_plain_text
-from ...analysis.files.formats.tables import unit_registry
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -80,13 +79,20 @@ OWN_WORDS = re.compile(r"\b(kn|v0|calibrated|rigid)\b")
 """Words of texts that are no quantities: "2/7 kn", "10 v0"."""
 
 
+@cache
+def _unit_registry() -> Any:
+    from pint import UnitRegistry
+
+    return UnitRegistry()
+
+
 @lru_cache  # the scenes of a sweep have the same texts, and pint reads each in milliseconds
 def to_si(text: str, unit: str, key: str = "") -> float:
     """A quantity such as "100 um" as a number of SI units; refused if it is none, or one of another dimension."""
     from pint import PintError
 
     try:
-        return float(unit_registry().Quantity(text).to(unit).magnitude)
+        return float(_unit_registry().Quantity(text).to(unit).magnitude)
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
         says = f'= "{text}" does not convert to {unit} ({reason}): give a number with a unit of that kind'

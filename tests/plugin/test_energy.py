@@ -1,6 +1,7 @@
 """Energy and virial that LAMMPS reports, and the energy that sliding and dashpots take: keyword energy."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,53 +12,12 @@ from faultgouge.pywrap.lammps.decks import DECKS
 
 KN, KT, MU, FX, FY, WIDTH = 2e5, 2e5 * 2 / 7, 0.5, 2.5, 3.0, 2.8
 
-HEAD = """
-variable        energy index 'energy yes'
-variable        dashpots index '20.0 10.0'
-variable        compensated index ''
-variable        dt index 1e-4
-units           lj
-dimension       2
-boundary        p f p
-atom_style      sphere
-atom_modify     map yes
-comm_modify     vel yes
-"""
-PILE = f"""
-region          box block 0 {WIDTH} -1 4 -0.5 0.5
-create_box      2 box
-create_atoms    1 single 0.5005 0.4996 0
-create_atoms    1 single 2.3 0.4996 0
-create_atoms    2 single 1.4 0.9346 0
-set             group all diameter 1.0
-set             group all mass 1.0
-group           top type 2
-"""
-LAW = f"""
-pair_style      mindlin/smooth {KN} {KT} {MU} damping ${{dashpots}} ${{energy}} ${{compensated}}
-pair_coeff      * *
-fix             floor all wall/mindlin/smooth {KN} {KT} {MU} ylo 0.0 damping ${{dashpots}} ${{energy}} ${{compensated}}
-fix             push top addforce {FX} -{FY} 0.0
-fix             move all nve/disc 1.0 ${{compensated}}
-timestep        ${{dt}}
-"""
+INPUTS = Path(__file__).with_name("inputs")
+HEAD, PILE, LAW, LOOK = ((INPUTS / f"{name}.in").read_text() for name in ("pile_head", "pile", "pile_law", "look"))
 MODEL = HEAD + PILE + LAW
 """Two disks on a floor that touch through the sides of a periodic box, and a third one that slides over them."""
-LOOK = """
-compute         ids all property/local patom1 patom2 cutoff radius
-compute         contact all pair/local p3 p7 p8 cutoff radius
-dump            pairs all local ${every} pairs c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]
-dump            disks all custom ${every} disks id id xu yu vx vy omegaz f_floor[3] f_floor[7] f_floor[${column}]
-dump_modify     pairs format float %.17g
-dump_modify     disks format float %.17g sort id
-"""
-AGAIN = f"""
-write_restart   middle.restart
-clear
-{HEAD}
-read_restart    middle.restart
-group           top type 2
-"""
+
+AGAIN = f"write_restart middle.restart\nclear\n{HEAD}read_restart middle.restart\ngroup top type 2\n"
 
 arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["double", "compensated"])
 
@@ -66,8 +26,20 @@ arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["
 def watch_script(lmp, tmp_path):
     """Runs a script, and gives what was seen of pairs and of disks, the tables of a dump, one a step."""
 
-    def run(script, **settings):
-        lmp(script, **settings)
+    def run(script, every=500, counted=True, compensated="", **settings):
+        lmp(
+            script,
+            kn=KN,
+            kt=KT,
+            mu=MU,
+            fx=FX,
+            fy=FY,
+            width=WIDTH,
+            every=every,
+            compensated=compensated,
+            column=7 + bool(compensated) + counted,
+            **settings,
+        )
         return [[frame.rows for frame in dump_frames(tmp_path / name)] for name in ("pairs", "disks")]
 
     return run
@@ -114,9 +86,9 @@ def balance(pairs, disks):
 )
 def test_work_of_the_load_is_stored_moves_or_is_dissipated(watch_script, dashpots, compensated):
     """What is missing is of first order in the time step: the power at the end of a step stands for the whole step."""
-    missing, settings = [], {"dashpots": dashpots, "compensated": compensated, "column": 8 + bool(compensated)}
+    missing, settings = [], {"dashpots": dashpots, "compensated": compensated, "every": 1}
     for steps in (2000, 4000):
-        found = watch_script(MODEL + LOOK + f"run {steps}\n", dt=0.2 / steps, every=1, **settings)
+        found = watch_script(MODEL + LOOK + f"run {steps}\n", dt=0.2 / steps, **settings)
         work, gained, dissipated, given = balance(*found)
         missing.append(work + given - gained - dissipated)
     assert dissipated > 0.05 * work
@@ -129,11 +101,11 @@ def test_work_of_the_load_is_stored_moves_or_is_dissipated(watch_script, dashpot
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_energies_go_through_a_restart(watch_script, compensated, ranks):
-    settings = {"every": 500, "compensated": compensated, "column": 8 + bool(compensated)}
-    straight, again = (
-        contacts(*(frames[-1] for frames in watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", **on, **settings)))
-        for middle, on in (("", {}), (AGAIN + LAW, {"ranks": ranks}))
-    )
+    def last(middle, **on):
+        found = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 500\n", compensated=compensated, **on)
+        return contacts(*(frames[-1] for frames in found))
+
+    straight, again = last(""), last(AGAIN + LAW, ranks=ranks)
     assert straight.keys() == again.keys()
     assert all(np.array_equal(straight[each], again[each]) for each in straight)
     assert max(row[2] for row in straight.values()) > 0
@@ -145,35 +117,21 @@ def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(wa
     """Energies begin at zero then, or are left out; a wall without them has no column for them."""
     again = AGAIN + LAW.replace("${energy}", f"energy {second}")
     seen = []
-    for middle, energy, more in ((again, f"energy {first}", second == "yes"), ("", "", False)):
-        settings = {"every": 500, "compensated": compensated, "column": 7 + bool(compensated) + more}
-        (pairs,), (disks,) = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 0\n", energy=energy, **settings)
+    for middle, energy, counted in ((again, f"energy {first}", second == "yes"), ("", "", False)):
+        settings = {"energy": energy, "counted": counted, "compensated": compensated}
+        (pairs,), (disks,) = watch_script(f"{MODEL}run 500\n{middle}{LOOK}run 0\n", **settings)
         seen.append((pairs, disks[:, :9]))
         assert not pairs[:, 4].any()
-        assert not more or not disks[:, 9].any()
+        assert not counted or not disks[:, 9].any()
     assert all(np.array_equal(one, other) for one, other in zip(*seen, strict=True))
 
 
 @pytest.mark.slow
 def test_energy_is_conserved_without_friction_to_second_order(lmp, tmp_path):
     """Without friction the forces have the energy that LAMMPS reports, floor included."""
-    script = f"""
-include         {DECKS}/system.in
-fix             move all nve/disc 1.0
-timestep        ${{dt}}
-unfix           load
-velocity        top set 0.02 0.0 0.0
-compute         ke all ke
-variable        total equal pe+c_ke+f_floor
-fix_modify      floor energy no
-thermo_style    custom step pe
-thermo_modify   norm no
-fix             series all ave/time 50 1 50 v_total c_ke file series format " %.17g"
-run             $(0.4/dt)
-"""
     drift = []
     for dt in (4e-4, 2e-4):
-        lmp(script, decks=DECKS, mu=0.0, dt=dt)
+        lmp(INPUTS / "drift.in", decks=DECKS, mu=0.0, dt=dt)
         _, total, kinetic = np.loadtxt(tmp_path / "series").T
         assert kinetic.max() > 10 * kinetic[0]  # the layer bursts apart: contact energy becomes kinetic
         drift.append(np.abs(total - total[0]).max())
@@ -181,27 +139,12 @@ run             $(0.4/dt)
 
 
 def test_virial_is_that_of_the_contacts(lmp, tmp_path):
-    script = f"""
-include         {DECKS}/system.in
-fix             move all nve/disc 1.0
-timestep        1e-3
-compute         bare all pressure NULL pair
-thermo_style    custom step c_bare[1] c_bare[2] c_bare[4] vol
-run             200
-print           "$(c_bare[1]:%.17g) $(c_bare[2]:%.17g) $(c_bare[4]:%.17g) $(vol:%.17g)" file virial
-unfix           move
-variable        name index state
-include         {DECKS}/write.in
-"""
-    lmp(script, decks=DECKS, fx=0.3)
+    lmp(INPUTS / "virial.in", decks=DECKS, fx=0.3)
     *pressure, volume = np.loadtxt(tmp_path / "virial")
     packing = read_dump(tmp_path / "state.disks")
-    pair = ~packing.contacts.floor
-    branch = packing.geometry.distance[pair, None] * packing.geometry.normal[pair]
-    force = (
-        packing.normal_force[pair, None] * packing.geometry.normal[pair]
-        + packing.tangential_force[pair, None] * packing.geometry.tangent[pair]
-    )
+    g, pair = packing.geometry, ~packing.contacts.floor
+    branch = g.distance[pair, None] * g.normal[pair]
+    force = (packing.normal_force[:, None] * g.normal + packing.tangential_force[:, None] * g.tangent)[pair]
     # LAMMPS divides by the volume of the box, which is 1 thick; xy is tallied as x times f_y
     stress = (branch.T @ force / volume)[[0, 1, 0], [0, 1, 1]]
     # a force is known to k eps x = 1e-11 of itself, and the shear stress of a packing at rest is all cancellation
