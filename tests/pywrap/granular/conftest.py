@@ -78,6 +78,7 @@ def beds(tmp_path_factory) -> Callable[..., Any]:
 def bed(beds):
     """LAMMPS with particles at rest, none of whose contacts is at the bound, and their configuration."""
 
+    @cache
     def make(law, d, damped: bool = True):
         lmp = beds(law, d, damped)
         return lmp, faultgouge.from_lammps(lmp)

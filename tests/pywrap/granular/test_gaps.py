@@ -45,7 +45,7 @@ def test_a_push_that_closes_a_gap_is_too_large(row):
     rise = stability(here, rise=velocity).rising  # against the spring of the floor
     assert (rise["next_event"], rise["next_change"]) == ("closes", pytest.approx(300 * GAP, rel=1e-3))
     for size, hit in ((0.5, False), (2.0, True)):
-        command(lmp, "velocity all set 0 0 0")
+        lmp.command("velocity all set 0 0 0")
         before = of_particle(lmp, "x", 2)[0]
         of_particle(lmp, "v", 1)[0] = size * most
         command(lmp, "run 200 post no")

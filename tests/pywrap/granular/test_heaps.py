@@ -46,8 +46,7 @@ HEAPS = {
 @pytest.mark.parametrize("which", HEAPS)
 def test_a_heap_after_pushes(heap, which):
     """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""
-    lmp = heap(*HEAPS[which])
-    here = faultgouge.from_lammps(lmp)
+    here = faultgouge.from_lammps(lmp := heap(*HEAPS[which]))
     is_proved(here, "laws", 1e-4)
     assert here.contacts.couple.sum() == len(here.contacts.touching)
     told, rolls = stability(here), which == "rolls at the bound"
