@@ -43,7 +43,8 @@ def opened(browser, tmp_path):
         path = shown if isinstance(shown, Path) else tmp_path / "page.html"
         if path is not shown:
             write_view(shown, path, "some packings", **more)
-        page = browser.new_page(viewport=viewport, offline=True)  # what is fetched is an error
+        scheme = "dark" if viewport is NARROW else "light"
+        page = browser.new_page(viewport=viewport, color_scheme=scheme, offline=True)  # what is fetched is an error
         pages.append(page)
         page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
