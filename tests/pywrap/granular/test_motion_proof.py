@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, is_proved, on_slope, refused
+from granular_packings import command, is_proved, on_slope, refused
 from table_rows import rows_of
 
 import faultgouge
@@ -135,22 +135,9 @@ def test_commands_of_another_run(sliding, change, says):
     assert "addforce" not in str(refusal.value)
 
 
-def test_bonds(lammps_with):
+def test_bonds(taken):
     """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
-    more = "1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4"
-    bonded = """fix move all nve/sphere
-fix drag all viscous 1.5
-bond_style harmonic
-bond_coeff 1 50.0 0.99
-special_bonds lj/coul 1.0 1.0 1.0
-run 0
-create_bonds single/bond 1 1 2
-run 60000"""
-    places = [(0, 0, 0.5), (0.99, 0, 0.5), (0.5, 0.86, 0.5), (0.5, 0.29, 1.3)]
-    spheres = deck(places, HERTZ[5:], "zplane 0 NULL contacts", timestep=0.002, more=bonded)
-    spheres = spheres.replace("atom_style sphere", "atom_style hybrid sphere bond\natom_modify map array")
-    lmp = lammps_with(spheres.replace("create_box 1 box", f"create_box {more}"))
-    found = faultgouge.from_lammps(lmp)
+    lmp, found = taken("", "bonded.in")
     is_proved(found, "differences")
     lmp.command("delete_bonds all bond 1 remove")
     without = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)

@@ -53,9 +53,8 @@ def test_a_run_that_fix_halt_ends_brings_nothing_to_rest(lammps_with):
     with refused(r"^LAMMPS ended a run while the packing came to rest, as fix halt and"):
         faultgouge.relax(lmp)
     lmp.commands_string("unfix stop\ntimer timeout unlimited")
-    for balance in (np.nan, -1.0):
-        with pytest.raises(BadInputError, match=f"^balance = {balance:g} is refused"):
-            faultgouge.relax(lmp, balance=balance)
+    with pytest.raises(BadInputError, match=r"^balance = -1 is refused"):
+        faultgouge.relax(lmp, balance=-1.0)
     assert faultgouge.relax(lmp) < 1e-8
 
 
