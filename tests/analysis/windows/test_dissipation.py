@@ -5,6 +5,7 @@ import pytest
 from families import with_dissipation
 from linearised import motion_matrix
 from scipy.linalg import block_diag
+from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError
@@ -45,8 +46,6 @@ def crossing(half_width, place=0.4):
 @pytest.mark.parametrize("half_width", [0.2, 1e-2, 1e-3])
 def test_windows_narrower_than_the_increment(half_width, damping):
     """Both ends of the increment are stable; the edges are those of the block by itself."""
-    from scipy.optimize import brentq  # slow to import
-
     block = crossing(half_width)
     found = find_windows(family(block, damping), [-1.0, 0.0, 1.0, 2.0])
     if growth(block, damping, 0.4) < 0:
