@@ -36,16 +36,16 @@ def modules() -> dict[str, Path]:
 
 
 @cache
-def tree(path: Path) -> ast.Module:
-    """The text of a module as Python reads it."""
-    return ast.parse(path.read_text(encoding="utf-8"))
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """The text of a module as Python reads it, the whole first."""
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 def imports(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     """Modules of the package that a module imports, anywhere in its text."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     found = set()
-    for node in ast.walk(tree(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -91,8 +91,7 @@ def test_nothing_of_the_program_imports_research():
 
 def test_every_class_has_a_name_of_its_own():
     """One name stands for one idea wherever it is read."""
-    nodes = [node for path in modules().values() for node in ast.walk(tree(path))]
-    names = [node.name for node in nodes if isinstance(node, ast.ClassDef)]
+    names = [each.name for path in modules().values() for each in nodes(path) if isinstance(each, ast.ClassDef)]
     assert len(names) > 100
     assert {name for name in names if names.count(name) > 1} == set()
 
@@ -109,7 +108,7 @@ def test_every_number_has_a_name_of_its_own():
     """One name stands for one tolerance, size or share; who needs the same number imports it."""
     names: dict[str, list[str]] = {}
     for module, path in modules().items():
-        for node in tree(path).body:
+        for node in nodes(path)[0].body:
             if isinstance(node, ast.Assign) and is_number(node.value):
                 [target] = node.targets
                 for each in target.elts if isinstance(target, ast.Tuple) else [target]:
