@@ -24,24 +24,24 @@ def bent(f):
 
 
 @pytest.mark.parametrize(
-    ("operator", "edges"),
+    ("operator", "loads", "edges"),
     [
-        (crossing(0.47, -0.04), (0.27, 0.67)),
-        (crossing(0.47, -0.0009), (0.44, 0.5)),
-        (bent, (0.475 ** (1 / 7), 0.525 ** (1 / 7))),
+        (crossing(0.47, -0.04), [0.0, 1.0, 2.0], (0.27, 0.67)),
+        (crossing(0.47, -0.0009), [0.0, 1.0, 2.0], (0.44, 0.5)),
+        (bent, [0.0, 1.0, 2.0], (0.475 ** (1 / 7), 0.525 ** (1 / 7))),
+        (normal_form(0.1), [0.2, 0.3], (0.2, None)),
+        (crossing(0.37, 1e-3), np.linspace(0, 1, 4), None),
     ],
 )
-def test_first_window_that_ends_within_its_increment(operator, edges):
-    window, doubtful = searched(operator, [0.0, 1.0, 2.0])
-    assert window.kind == "coalescence"
-    assert (window.fx_onset, window.fx_end) == pytest.approx(edges, abs=DIGITS)
+def test_first_window_that_is_known(operator, loads, edges):
+    """It begins and ends within an increment, is there from the start, or there is none."""
+    window, doubtful = searched(operator, loads)
     assert doubtful == ()
-
-
-def test_first_window_of_real_eigenvalues_or_from_the_start():
-    assert searched(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) == (None, ())
-    window, _ = searched(normal_form(0.1), [0.2, 0.3])
-    assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)
+    if edges is None:
+        assert window is None
+        return
+    assert window.kind == ("coalescence" if edges[1] else "start")
+    assert (window.fx_onset, window.fx_end) == pytest.approx(edges, abs=DIGITS)
 
 
 def test_load_without_equilibrium_ends_the_search_for_the_first_window():
@@ -82,9 +82,8 @@ def jumping(f):
 
 def test_pair_that_is_announced_and_not_found_is_told_of():
     """Slices that announce a pair of which the operator knows nothing: the shortest increment about it is named."""
-    window, doubtful = searched(jumping, [0.0, 1.0])
-    assert window is None
-    assert doubtful == ((7 / 16, 8 / 16),)
+    none, doubtful = searched(jumping, [0.0, 1.0])
+    assert (none, doubtful) == (None, ((7 / 16, 8 / 16),))
     with pytest.raises(OnsetError, match=r"expected between 0\.4375 and 0\.5: take smaller increments"):
         raise OnsetError.of_search(1.0, doubtful)
 
@@ -117,9 +116,8 @@ def test_first_window_of_hundreds_of_disks(path):
     onset, last = window.fx_onset, max(fx for fx in path.grid if fx < window.fx_onset)
     before, below, above = (eigvals(operator(fx).toarray()) for fx in (last, onset - 1e-6, onset + 1e-6))
     # a double eigenvalue is uncertain by the root of u |A| times its coupling
-    assert max(np.abs(before.imag).max(), np.abs(below.imag).max()) < 1e-4
-    (above,) = (value for value in above if value.imag > 1e-4)
-    assert above.real == pytest.approx(window.eigenvalue, abs=1e-2)
+    assert np.abs([before.imag, below.imag]).max() < 1e-4
+    assert above[above.imag > 1e-4].real == pytest.approx([window.eigenvalue], abs=1e-2)
 
 
 @pytest.mark.parametrize("search", [complex_windows, searched])
