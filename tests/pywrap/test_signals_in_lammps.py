@@ -12,6 +12,11 @@ from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.undamped import time_step
 
 LEAST = {"packing": {"disks": 30, "width": 6.0}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+BAD_TABLES = {
+    "0 1\n1 nan\n": "something else than two numbers, time and value, in line 2",
+    "0 1\n2 1\n1 1\n": "not later than the one before in line 3",
+    "0 1\n": "fewer than two rows",
+}
 
 
 @pytest.fixture(scope="module")
@@ -30,12 +35,10 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     signal = of_trace(obspy.read()[0]).scale_by(scale, 6.0 / 30)
     assert len(signal) == 3000
     acting = signal if on == "layer" else signal.derivative()
-    dt, every = time_step(packing), 20
-    rows = []
+    dt, every, rows = time_step(packing), 20, []
     with Engine(packing) as engine, engine.undamped(dt, signal=acting, on=on) as dynamics:
         for _ in range(int(3.0 / dt / every)):
-            motion = dynamics.advance(every)
-            rows.append(motion.velocity[packing.top, 0].mean())
+            rows.append(dynamics.advance(every).velocity[packing.top, 0].mean())
     times = dt * every * np.arange(1, len(rows) + 1)
     response = impulse_response(packing, layer_force(packing, 1.0) if on == "layer" else floor_force(packing))
     # the velocity after an impulse, summed over the signal
@@ -47,19 +50,12 @@ def test_record_moves_the_packing_as_linear_response_says(packing, on, scale):
     assert np.abs(np.array(rows) - predicted).max() < 1e-2 * np.abs(rows).max()
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("0 1\n1 nan\n", "something else than two numbers, time and value, in line 2"),
-        ("0 1\n2 1\n1 1\n", "not later than the one before in line 3"),
-        ("0 1\n", "fewer than two rows"),
-    ],
-)
+@pytest.mark.parametrize("text", BAD_TABLES)
 @pytest.mark.slow
-def test_lammps_refuses_a_bad_table(lmp, tmp_path, text, says):
+def test_lammps_refuses_a_bad_table(lmp, tmp_path, text):
     (tmp_path / "bad.txt").write_text(text)
     done = lmp(DECKS / "perturb.in", fails=True, decks=DECKS, signal="bad.txt")
-    assert says in done.stdout + done.stderr
+    assert BAD_TABLES[text] in done.stdout + done.stderr
 
 
 def test_two_columns_and_records_are_read(tmp_path):
