@@ -53,14 +53,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .packing.law import MindlinLaw
     from .packing.packing import Packing
     from .packing.solid_fraction import solid_fraction
-    from .responses.growth import (
-        Growth,
-        PowerLaw,
-        fit_growth,
-        fit_power_law,
-        growth_of_run,
-        mean_square_displacement,
-    )
+    from .responses.growth import Growth, PowerLaw, fit_growth, fit_power_law, growth_of_run, mean_square_displacement
     from .responses.response import layer_force, linear_response
     from .responses.signals import Signal
     from .responses.slips import Slip

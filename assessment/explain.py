@@ -75,19 +75,11 @@ def everything(held: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
 def explain(scene: Scene) -> dict[str, Any]:
     """Set the scene's run up, and say which features LAMMPS has loaded.
 
-    Returns
-    -------
-    dict
-        disks, remark : of the packing that was set up; loaded : the `contents` of the scene's own run; imported,
-        left_out : heavy packages that this process has imported after that run, and those that it has not; parts : for
-        each feature its name, whether it is included, as LAMMPS says, the reason, and what it adds; defaults : keys
-        that the scene leaves to their defaults; units : k_n, F_y, the overburden and one unit of the scene in SI, None
-        without [units].
-
-    Raises
-    ------
-    SceneError, NoEquilibriumError, EngineError
-        If the packing cannot be settled.
+    Returns disks and remark of the packing that was set up; loaded, the `contents` of the scene's own run; imported and
+    left_out, heavy packages that this process has imported after that run, and those that it has not; parts, for each
+    feature its name, whether it is included, as LAMMPS says, the reason, and what it adds; defaults, keys that the
+    scene leaves to their defaults; units, k_n, F_y, the overburden and one unit of the scene in SI, None without
+    [units]. Raises SceneError, NoEquilibriumError or EngineError if the packing cannot be settled.
     """
     resolved, real = scene.resolved(), real_units(scene)
     unused = {"relax"} if scene.ramp is None or scene.ramp.method == "newton" else set()

@@ -8,13 +8,11 @@ mode is 8 bits a coordinate.
 import base64
 import json
 from collections.abc import Sequence
-from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
@@ -26,17 +24,11 @@ from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 
 from .disk_view import View, cut, in_box
-from .followed_pairs import (
-    SECONDS_OF_1000,
-    FollowedPair,
-    Progress,
-    RampEigenvalues,
-    follow_eigenvalues,
-    members_of,
-)
+from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues, members_of
 from .mode import displacement
 from .packing import LEAST_SHARE, faces_of
-from .pair import curve_through
+from .pages import filled
+from .pair import curve_through, mean_and_square
 from .spheres import ENDS
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 
@@ -59,21 +51,12 @@ class Axis(NamedTuple):
     meaning: str
     values: Floats
 
-    @classmethod
-    def of_loads(cls, packings: Sequence[HasConfiguration]) -> "Axis":
-        """The shear force of a ramp; a load parameter of other codes."""
-        meaning = "force on each disk of the upper layer" if packings[0].top.any() else "the load"
-        return cls("Fₓ", meaning, np.array([packing.fx for packing in packings]))
 
-
-def equally_spaced(count: int, most: int) -> list[int]:
-    """Which of some equilibria a page shows: all, or so many of them, the first and the last among these."""
-    return sorted({round(k) for k in np.linspace(count - 1, 0, min(count, most))})
-
-
-def loads_shown(disks: int) -> int:
-    """How many loads a page of so many disks has by default: 60, or as many as take a minute, but six at least."""
-    return max(min(60, round(60 / SECONDS_OF_1000 * (1000 / disks) ** 3)), 6)
+def loads_shown(count: int, disks: int, most: int | None = None) -> list[int]:
+    """Which of some equilibria a page shows: all, or so many of them, the first and the last among these; by default
+    60 at the most, or as many as take a minute, but six at least."""
+    most = max(min(60, round(60 / SECONDS_OF_1000 * (1000 / disks) ** 3)), 6) if most is None else most
+    return [round(k) for k in np.linspace(count - 1, 0, min(count, most))]
 
 
 def write_view(
@@ -91,7 +74,9 @@ def write_view(
     axis : Axis, optional
         What changes from packing to packing; the load by default.
     """
-    axis, first = axis or Axis.of_loads(packings), packings[0]
+    first = packings[0]
+    meaning = "force on each disk of the upper layer" if first.top.any() else "the load"  # a parameter of other codes
+    axis = axis or Axis("Fₓ", meaning, np.array([packing.fx for packing in packings]))
     followed = follow_eigenvalues(packings, progress)
     verdicts = followed.verdicts
     room = BYTES_OF_MODES / (2 * first.coordinates * len(packings))
@@ -108,7 +93,7 @@ def write_view(
     rates += [[0.0 if v.stable else v.growth_rate for v in verdicts], [v.undamped.growth_rate for v in verdicts]]
     opens = next((int(np.argmax(each)) for each in rates if max(each) > 0), len(packings) - 1)
     data = {
-        "axis": {"name": axis.name} if legs else None,
+        "axis": {"name": axis.name, "meaning": axis.meaning} if legs else None,
         "legs": [leg.tolist() for leg in legs],
         "opens": opens,
         "dissipative": any(verdict.dissipative for verdict in verdicts),
@@ -136,44 +121,22 @@ def write_view(
         "Drag to turn.": first.dimension == 3,
         "Width of a bar: normal force.": True,
     }
-    folder = files(__package__ or "") / "view"
-    loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
-    environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True)
-    page = environment.get_template("page.html.j2").render(
-        title=title,
-        axis=axis if legs else None,
-        count=len(packings),
-        opens=opens,
-        dissipative=data["dissipative"],
-        grows=any(verdict.undamped.growth_rate for verdict in verdicts),
-        cycle=bool(disks),
-        series=series is not None,
-        gradient=", ".join(_colours(8)),
-        legend=" ".join(words for words, shown in kinds.items() if shown),
-        data=json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
-    )
-    write_text(path, page)
+    data |= {
+        "json": json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
+        "title": title,
+        "grows": any(verdict.undamped.growth_rate for verdict in verdicts),
+        "gradient": ", ".join(_colours(8)),
+        "legend": " ".join(words for words, shown in kinds.items() if shown),
+    }
+    write_text(path, filled(f"{__package__}.view", "page.html.j2", data, autoescape=True))
 
 
 class _Images(NamedTuple):
-    """Every image of a particle and of a contact that the page draws.
+    """Every image of a particle and of a contact that the page draws, by the particle and the contact of each.
 
-    Attributes
-    ----------
-    place : ndarray, shape (n, 3)
-        Centres, length.
-    particle : ndarray of int, shape (n,)
-        Index of the particle of each image.
-    bar : ndarray, shape (c, 2, 3)
-        Ends of the bars of contacts, length.
-    contact : ndarray of int, shape (c,)
-        Index of the contact of each bar.
-    low, high : ndarray, shape (dimension,)
-        The frame of the picture of disks; of spheres what lies in it.
-    corners : ndarray, shape (8, 3)
-        Of the box of spheres; bit k of the number of a corner says on which side along edge k.
-    periodic : bool
-        Whether a picture of disks repeats.
+    `place` (n, 3) has the centres, and `bar` (c, 2, 3) the ends of bars. The picture of disks goes from `low` to
+    `high`, and repeats if it is periodic; of spheres all lies between. Bit k of the number of one of the `corners`
+    (8, 3) of the box of spheres says on which side along edge k.
     """
 
     place: Floats
@@ -262,15 +225,10 @@ def sentences_of(verdict: Stability) -> list[str]:
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:
     """The eigenvalues of a pair at the packings, the curves through them, and the shapes of its modes."""
-    found = _mean_and_square(pair.eigenvalues)
+    found = mean_and_square(pair.eigenvalues)
     ways = [curve_through(axis.values[leg], pair.eigenvalues[leg]) for leg in legs]
     shapes = [_shape(pair, k) if np.isfinite(each) else None for k, each in enumerate(found["mean"])]
-    return {**found, "curves": [{"load": load, **_mean_and_square(values)} for load, values in ways], "shapes": shapes}
-
-
-def _mean_and_square(eigenvalues: np.ndarray) -> dict[str, Floats]:
-    """Mean of both members, and the square of their difference."""
-    return {"mean": eigenvalues.mean(axis=1).real, "square": ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real}
+    return {**found, "curves": [{"load": load, **mean_and_square(values)} for load, values in ways], "shapes": shapes}
 
 
 def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:

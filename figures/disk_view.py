@@ -30,22 +30,10 @@ def in_box(own: Configuration) -> tuple[Floats, Floats]:
 
 
 class View(NamedTuple):
-    """Which images of the disks a picture shows, and its edges.
+    """Which images of the disks a picture shows, from its lower left corner `low` to its upper right corner `high`.
 
-    Attributes
-    ----------
-    low, high : ndarray, shape (2,)
-        Lower left and upper right corner, length.
-    disk : ndarray of int, shape (n,)
-        The disk of each image.
-    place : ndarray, shape (n, 2)
-        Its centre, length.
-    contact : ndarray of int, shape (c,)
-        The contact of each bar.
-    start, end : ndarray, shape (c, 2)
-        Where the bar begins and ends, length.
-    edges : ndarray, shape (e, 2, 2)
-        Ends of the lines at which the picture repeats, length.
+    `disk` (n,) and `place` (n, 2) are the disk of each image and its centre; `contact`, `start` and `end` the contact
+    of each bar, and where the bar begins and ends. The picture repeats at the lines `edges` (e, 2, 2).
     """
 
     low: Floats

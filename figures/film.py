@@ -47,18 +47,9 @@ class FilmError(BadInputError):
 class Film:
     """A film, frame by frame.
 
-    Parameters
-    ----------
-    figure : Figure
-        With everything on it.
-    moving : sequence of Artist
-        What changes from frame to frame, in the order in which it is drawn.
-    show : callable
-        Puts these artists where they are in a frame, by its number.
-    count : int
-        How many frames there are.
-    dots : int, optional
-        Dots an inch; by default so many that a frame has `LINES` lines.
+    `figure` has everything on it, `moving` what changes from frame to frame, in the order in which it is drawn, and
+    `show` puts these artists where they are in a frame, by its number. Without `dots` an inch a frame has `LINES`
+    lines.
     """
 
     @styled
@@ -97,19 +88,10 @@ class Film:
 
 
 def write_film(film: Film, path: Path, rate: float = 10.0, progress: Progress = lambda frames, count: frames) -> None:
-    """Write a film; frames are made one at a time.
+    """Write a film to a name that ends in .gif or .mp4; frames are made one at a time.
 
-    Parameters
-    ----------
-    path : Path
-        A name that ends in .gif or .mp4.
-    rate : float
-        Frames a second. A GIF counts in hundredths of a second, so that 100 must be a multiple of it.
-
-    Raises
-    ------
-    FilmError
-        If the name ends otherwise, or imageio-ffmpeg is not installed.
+    A GIF counts in hundredths of a second, so that 100 must be a multiple of the frames a second, `rate`. Raises
+    FilmError if the name ends otherwise, or imageio-ffmpeg is not installed.
     """
     check_name(path)
     with replace_whole(path) as new:

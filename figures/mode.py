@@ -41,19 +41,12 @@ ARROWS |= {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "minlengt
 
 
 class ModeShape(NamedTuple):
-    """How the particles of a packing move in a mode.
+    """How the particles of a packing move in a mode: its number, counted by the real part of the eigenvalue from 0, the
+    eigenvalue lambda, the displacement, the participation ratio, and the share of rotation in the kinetic energy.
 
-    Attributes
-    ----------
-    number : int
-        Which, counted by the real part of the eigenvalue from 0.
-    eigenvalue : complex
-        lambda, 1 / time^2.
-    displacement : ndarray of complex, shape (axes, N)
-        x, y and R theta of every disk, or all coordinates of every sphere. The longest displacement in space is one,
-        or the largest rotation where nothing is displaced; its phase is turned as the module says.
-    participation, rotation : float
-        Participation ratio, and share of rotation in the kinetic energy.
+    The displacement, shape (axes, N), has x, y and R theta of every disk, or all coordinates of every sphere. The
+    longest displacement in space is one, or the largest rotation where nothing is displaced; its phase is turned as the
+    module says.
     """
 
     number: int
@@ -89,9 +82,8 @@ class ModeShape(NamedTuple):
         """The same for a caption."""
         sign = rf" \pm {abs(self.eigenvalue.imag):.4g}\,i" if self.is_complex else ""
         ratios = f"participation ratio {self.participation:.2f}, rotation {100 * self.rotation:.0f} %"
-        return (
-            rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$" + f"\n{ratios} of the kinetic energy"
-        )
+        value = rf"$\lambda = {self.eigenvalue.real:.6g}{sign}$"
+        return f"mode {self.number}: {value}\n{ratios} of the kinetic energy"
 
 
 def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
@@ -198,21 +190,10 @@ def draw_mode(packing: HasConfiguration, number: int | None = None, axes: Axes |
 
 @styled
 def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str) -> Figure:
-    """Modes side by side, with their numbers below.
-
-    Parameters
-    ----------
-    modes : sequence of ModeShape
-        One or two.
-
-    Returns
-    -------
-    Figure
-        A complex mode of disks also a quarter of a period later.
-    """
-    spheres = packing.dimension == 3
-    phases = [(0.0, np.pi / 2) if mode.is_complex and not spheres else (0.0,) for mode in modes]
-    panels = [(mode, phase) for mode, moments in zip(modes, phases, strict=True) for phase in moments]
+    """Modes side by side, one or two, with their numbers below; a complex mode of disks also a quarter of a period
+    later."""
+    spheres, two = packing.dimension == 3, (0.0, 0.5 * np.pi)
+    panels = [(mode, phase) for mode in modes for phase in (two if mode.is_complex and not spheres else two[:1])]
     figure, axes, points = figure_for(packing, len(panels), below=0.95)
     for one, (mode, phase) in zip(axes, panels, strict=True):
         _show_mode(one, packing, mode, phase, points)

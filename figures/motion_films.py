@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba_array
 from matplotlib.figure import Figure
@@ -26,7 +25,7 @@ from .film import DOTS, Film
 from .mode import ModeShape, finish
 from .packing import COLOURS, PackingArtist, faces_of, figure_for
 from .series import few_decades, in_powers_of_ten
-from .style import BULK, EDGE, INK, styled
+from .style import BULK, EDGE, INK, figure_of, styled
 
 LARGEST_SHOWN = 0.6
 """The largest displacement on the screen, in units of the smallest radius: disks stay beside their neighbours."""
@@ -41,17 +40,7 @@ WAY_COLOURS = LinearSegmentedColormap.from_list("way", [BULK, "#4fb286"])
 
 
 class RunMotion(NamedTuple):
-    """Displacements of an undamped run.
-
-    Attributes
-    ----------
-    packing : Packing
-        The equilibrium where the run began.
-    time : ndarray, shape (T,)
-        Times.
-    displacement : ndarray, shape (T, N, 2)
-        From the equilibrium, length.
-    """
+    """Displacements of an undamped run from the equilibrium where it began, shape (T, N, 2), at `time` (T,)."""
 
     packing: Packing
     time: Floats
@@ -90,19 +79,8 @@ def _power_of_ten(packing: HasConfiguration, largest: Floats) -> Floats:
 
 
 class Course(NamedTuple):
-    """A curve, and the places of packings on it.
-
-    Attributes
-    ----------
-    x, y : ndarray, shape (P,)
-        The curve.
-    places : sequence of int
-        Point of the curve of each packing.
-    labels : (str, str)
-        Of the axes.
-    words : sequence of str
-        Above each packing.
-    """
+    """A curve `x`, `y` (P,) with the labels of its axes; `places` has the point of the curve of each packing, and
+    `words` what stands above it."""
 
     x: Floats
     y: Floats
@@ -130,34 +108,27 @@ class Course(NamedTuple):
         return cls(time, force, places, ("$t$", "$F$"), words)
 
 
-def _packing_and_curve(packing: Packing, scale: float = 0.0) -> tuple[Figure, Axes, Axes, float]:
-    """A figure with a packing, and room for a scale, on the left, and a curve on the right; points per unit of length
-    on the left."""
-    width, height = View.of(packing).size
+def _packing_and_curve(size: Floats, drawn: Packing, color: str = "none") -> tuple[PackingArtist, Axes]:
+    """A packing on the left of a figure, with room for a scale of colours, and axes for a curve on the right."""
+    (width, height), scale = size, 0.7 if color != "none" else 0.0
     across = min(2.4, 3.2 * width / height)
     figure = Figure(figsize=(across + 2.5 + scale, max(2.0, across * height / width + 0.45)))
     figure.set_layout_engine("constrained", h_pad=0.07)
     left, right = figure.subplots(1, 2, width_ratios=(across + scale, 2.3))
     right.spines[:].set_color(INK)
-    return figure, left, right, 72 * across / width
+    return PackingArtist(left, drawn, color, 2 * drawn.radius.max(), 72 * across / width), right
 
 
 def _beside_curve(
-    artist: PackingArtist, panels: tuple[Axes, Axes], course: Course, which: NDArray[np.int_],
-    draw: Callable[[int], object], key: str,
-) -> tuple[list[Artist], Callable[[int], None]]:  # fmt: skip
-    """What moves, and the function that shows a frame, of a packing on the left and its place on a curve on the right.
+    artist: PackingArtist, axes: Axes, course: Course, which: NDArray[np.int_], draw: Callable[[int], object],
+    key: str, dots: int | None,
+) -> Film:  # fmt: skip
+    """The film of a packing beside its place on a curve.
 
-    Parameters
-    ----------
-    which : ndarray of int
-        The place of each frame, counted along `course.places`.
-    draw : callable
-        Puts the packing where it is at such a place.
-    key : str
-        Words below the packing.
+    `which` has the place of each frame, counted along `course.places`; `draw` puts the packing where it is at such a
+    place; `key` is words below the packing.
     """
-    left, axes = panels
+    left = artist.axes
     says = left.text(0.5, 1.01, "", transform=left.transAxes, ha="center", va="bottom", fontsize=8)
     left.text(0.5, -0.02, key, transform=left.transAxes, ha="center", va="top", fontsize=7)
     axes.plot(course.x, course.y, color=BULK, linewidth=1.2)
@@ -171,22 +142,15 @@ def _beside_curve(
         line.set_data(course.x[: here + 1], course.y[: here + 1])
         dot.set_data([course.x[here]], [course.y[here]])
 
-    return [*artist.moving, says, line, dot], show
+    return Film(figure_of(axes), [*artist.moving, says, line, dot], show, len(which), dots)
 
 
 @styled
 def film_of_run(motion: RunMotion, frames: int, dots: int | None = DOTS) -> Film:
-    """An undamped run with magnified displacements, and D(t) beside it.
-
-    Parameters
-    ----------
-    frames : int
-        How many frames; the samples of the run are taken at even intervals of time.
-    """
+    """An undamped run with magnified displacements, at even intervals of time, and D(t) beside it."""
     packing, time, factor = motion.packing, motion.time, motion.magnification()
     msd = np.sum(motion.displacement**2, axis=2).mean(axis=1)
-    figure, axes, beside, points = _packing_and_curve(packing)
-    artist = PackingArtist(axes, packing, margin=2 * packing.radius.max(), points=points)
+    artist, beside = _packing_and_curve(View.of(packing).size, packing)
     disk = artist.view.disk
     artist.chains.set(color=EDGE, linewidth=0.5, zorder=2)
     artist.disks.set(array=np.zeros(len(disk)), cmap=DISPLACEMENT_COLOURS, norm=Normalize(0, 1))
@@ -207,8 +171,7 @@ def film_of_run(motion: RunMotion, frames: int, dots: int | None = DOTS) -> Film
     words = [rf"$t = {t:.3f}$, displacements $\times\,10^{{{power}}}$" for t, power in zip(time, powers, strict=True)]
     course = Course(time, msd, range(len(time)), ("$t$", "$D(t)$"), words)
     which = np.clip(np.searchsorted(time, np.linspace(time[0], time[-1], frames)), 0, len(time) - 1)
-    shown = _beside_curve(artist, (axes, beside), course, which, draw, "red: moves farthest; grey: rests")
-    return Film(figure, *shown, frames, dots)
+    return _beside_curve(artist, beside, course, which, draw, "red: moves farthest; grey: rests", dots)
 
 
 @styled
@@ -216,30 +179,20 @@ def film_of_ramp(
     packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS,
     course: Course | None = None, by_way: bool = False,
 ) -> Film:  # fmt: skip
-    """The equilibria of a ramp, and F_x over the displacement of the upper layer beside them.
-
-    Parameters
-    ----------
-    frames : int
-        How many frames; each equilibrium is shown for about as long as the others.
-    color : str
-        As of :func:`~faultgouge.figures.draw_packing`.
-    course : Course, optional
-        The curve beside the packings, and their places on it; F_x over the displacement by default.
-    by_way : bool
-        Whether the colours of disks show how far they have moved since the first packing, in place of the layers.
-    """
+    """The equilibria of a ramp, each for about as long as the others, and beside them the course, by default F_x over
+    the displacement of the upper layer. Colours are those of :func:`~faultgouge.figures.draw_packing`; `by_way`, those
+    of disks show how far they have moved since the first packing, in place of the layers."""
     first, course = packings[0], course or Course.of_ramp(packings)
     shifts = np.array([nearest_image(each.position - first.position, first.box_length) for each in packings])
     largest = np.linalg.norm(shifts, axis=2).max()
     factor = max(1.0, float(_power_of_ten(first, largest))) if largest > 0 else 1.0
-    figure, axes, beside, points = _packing_and_curve(first, 0.7 if color != "none" else 0.0)
+    view = View.of(first)
     # the last equilibrium has most of the slips, so that there are colours from the first frame on
-    artist = PackingArtist(axes, packings[-1], color, 2 * first.radius.max(), points)
-    disks, chains, view = artist.disks, artist.chains, View.of(first)
+    artist, beside = _packing_and_curve(view.size, packings[-1], color)
+    disks, chains, axes = artist.disks, artist.chains, artist.axes
     widest = max(each.normal_force.max(initial=0.0) for each in packings) or 1.0
     if coloured := chains.get_array() is not None:
-        bar = figure.colorbar(chains, ax=axes, shrink=0.6, aspect=28, pad=0.02, location="left")
+        bar = figure_of(beside).colorbar(chains, ax=axes, shrink=0.6, aspect=28, pad=0.02, location="left")
         bar.set_label(COLOURS[color][0])
     axes.set(xlim=(view.low[0], view.high[0]))
     faces = faces_by_way(packings, shifts) if by_way else [to_rgba_array(faces_of(each)) for each in packings]
@@ -260,17 +213,12 @@ def film_of_ramp(
     course = course._replace(words=[f"{each}, displacements {magnified}" for each in course.words])
     which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
     key = "the greener, the farther moved" if by_way else ""
-    return Film(figure, *_beside_curve(artist, (axes, beside), course, which, draw, key), frames, dots)
+    return _beside_curve(artist, beside, course, which, draw, key, dots)
 
 
 def faces_by_way(packings: Sequence[Packing], shifts: Floats) -> list[NDArray[Any]]:
-    """Colours of the disks of each packing, shape (N, 4), greener the farther they have moved; rattlers stay white.
-
-    Parameters
-    ----------
-    shifts : ndarray, shape (S, N, 2)
-        Displacements since the first packing, length.
-    """
+    """Colours of the disks of each packing, shape (N, 4), greener the larger their `shifts` (S, N, 2) since the first;
+    rattlers stay white."""
     ways, found = np.linalg.norm(shifts, axis=2), []
     # single disks, which are squeezed out or roll, move farther than all others
     most = np.quantile(ways, 0.9, axis=1).max() or 1.0

@@ -68,30 +68,17 @@ def style_of_bars(packing: HasConfiguration, color: str) -> dict[str, Any]:
 class PackingArtist:
     """Disks on axes, which can be moved from frame to frame, with the bars of their contacts, and their floor.
 
-    Parameters
-    ----------
-    color : str
-        A key of `COLOURS`, or "none".
-    margin : float
-        How far images beyond the sides of the box may move into sight, length.
-    points : float, optional
-        Points per unit of length, so that widths of lines are to scale; as the axes stand now by default.
-
-    Attributes
-    ----------
-    disks : EllipseCollection
-        Every image of every disk.
-    chains : LineCollection
-        Every image of every contact.
-    moving : tuple of Artist
-        What a film draws in each frame, in its order: disks and contacts, and the floor that hides what goes below.
+    Images move into sight from within `margin` beyond the sides of the box. With `points` per unit of length widths of
+    lines are to scale, by default as the axes stand now. `disks` and `chains` have every image of every disk and
+    contact; `moving` is what a film draws in each frame, in its order: these two, and the floor that hides what goes
+    below.
     """
 
     def __init__(
         self, axes: Axes, packing: HasConfiguration, color: str = "none", margin: float = 0.0,
         points: float | None = None,
     ) -> None:  # fmt: skip
-        self.packing, self.margin, self.view = packing, margin, View.of(packing, margin)
+        self.axes, self.packing, self.margin, self.view = axes, packing, margin, View.of(packing, margin)
         low, high = self.view.low, self.view.high
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_axis_off()
@@ -136,19 +123,9 @@ class PackingArtist:
 def figure_for(
     packing: HasConfiguration, count: int = 1, beside: float = 0.1, below: float = 0.52
 ) -> tuple[Figure, list[Axes], float]:
-    """A figure with axes for the same packing so many times.
+    """A figure with axes for the same packing so many times: figure, axes, and points per unit of length on the axes.
 
-    Parameters
-    ----------
-    beside, below : float
-        Room for scales beside each packing and for words above and below, of disks, inch.
-
-    Returns
-    -------
-    figure, axes
-        A list of axes.
-    points : float
-        Points per unit of length on the axes.
+    `beside` each packing of disks is room for scales, and `below` room for words above and below, inch.
     """
     if packing.dimension == 3:
         left, right, bottom, top = frame_of(packing.configuration)
@@ -244,10 +221,9 @@ def _add_keys(axes: Axes, packing: HasConfiguration, chains: LineCollection, col
     if largest:
         unit = 10.0 ** np.floor(np.log10(largest))
         values = [part * unit for part in (0.5, 1, 2, 5) if part * unit <= largest]
-        bars = [
-            Line2D([], [], color=INK, linewidth=widest * value / largest, label=f"${'f_n = ' * (not k)}{value:g}$")
-            for k, value in enumerate(values)
-        ]
+        names = [f"${'f_n = ' * (not k)}{value:g}$" for k, value in enumerate(values)]
+        widths = [widest * value / largest for value in values]
+        bars = [Line2D([], [], color=INK, linewidth=w, label=name) for w, name in zip(widths, names, strict=True)]
         entries = [*([] if flat else patches), *bars]
         figure.legend(handles=entries, loc="outside lower center", ncols=len(entries), columnspacing=1.2)
 

@@ -40,24 +40,19 @@ def render(package: str, name: str, **numbers: Any) -> str:
     str
         The page in Markdown, its paragraphs filled.
     """
-    return fill_paragraphs(_text(package, name, numbers))
+    return fill_paragraphs(filled(package, name, numbers))
 
 
 def lines(package: str, name: str, **numbers: Any) -> list[str]:
     """Lines for a terminal, as wide as they are; arguments as of `render`."""
-    return [line for line in _text(package, name, numbers).splitlines() if line]
+    return [line for line in filled(package, name, numbers).splitlines() if line]
 
 
-def _text(package: str, name: str, numbers: dict[str, Any]) -> str:
-    folder = files(package)
-    environment = Environment(
-        loader=FunctionLoader(lambda template: (folder / template).read_text()),
-        undefined=StrictUndefined,
-        autoescape=False,  # Markdown, not HTML
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+def filled(package: str, name: str, numbers: dict[str, Any], autoescape: bool = False) -> str:
+    """A template of the folder of a package, filled; `autoescape` if it is HTML, and not Markdown."""
+    loader = FunctionLoader(lambda template: (files(package) / template).read_text(encoding="utf-8"))
+    how: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=autoescape, **how)
     environment.filters["number"] = format
     environment.filters["uncertain"] = with_uncertainty
     return environment.get_template(name).render(**numbers)

@@ -27,25 +27,13 @@ DOTTED_LOADS = 100
 
 
 def curve_through(load: Floats, eigenvalues: NDArray[np.complex128]) -> tuple[Floats, NDArray[np.complex128]]:
-    """The curve of a pair of eigenvalues through its stored loads.
+    """The curve of a pair of eigenvalues through the stored loads, which increase or decrease: loads and both members.
 
     The interpolation keeps to the shape of the numbers (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 238 (1980)): D
-    does not change its sign between two loads with the same sign of D.
-
-    Parameters
-    ----------
-    load : ndarray, shape (n,)
-        Stored loads, strictly increasing or strictly decreasing.
-    eigenvalues : ndarray of complex, shape (n, 2)
-        Both members, two real numbers or two complex conjugates; nan where the pair is unknown.
-
-    Returns
-    -------
-    load : ndarray, shape (m,)
-        The stored loads at which the pair is known, the coalescences, and loads in between; nan between two stretches
-        of known loads.
-    eigenvalues : ndarray of complex, shape (m, 2)
-        Both members: the one with the positive imaginary part, or the lower one, first.
+    does not change its sign between two loads with the same sign of D. A pair, shape (n, 2), is two real numbers or two
+    complex conjugates, nan where it is unknown. The curve has the stored loads at which the pair is known, the
+    coalescences, and loads in between, with nan between two stretches of known loads; the member with the positive
+    imaginary part, or the lower one, is first.
     """
     known = np.isfinite(eigenvalues).all(axis=1)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
@@ -55,11 +43,16 @@ def curve_through(load: Floats, eigenvalues: NDArray[np.complex128]) -> tuple[Fl
     return joined[:, 0].real, joined[:, 1:]
 
 
+def mean_and_square(eigenvalues: NDArray[np.complex128]) -> dict[str, Floats]:
+    """Mean of both members of a pair, and the square of their difference, 4 D."""
+    return {"mean": eigenvalues.mean(axis=1).real, "square": ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real}
+
+
 def _curve(load: Floats, eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Rows of a load and two eigenvalues along one stretch of known loads, with loads that crowd at the roots of D."""
     order = slice(None, None, -1 if load[-1] < load[0] else 1)
     load, eigenvalues = load[order], eigenvalues[order]
-    mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
+    mean, square = mean_and_square(eigenvalues).values()
     if len(load) > 1:
         mean_at, square_at = PchipInterpolator(load, mean), PchipInterpolator(load, square)
         roots = square_at.roots(extrapolate=False)

@@ -61,22 +61,12 @@ def draw_series(
 
 @styled
 def draw_growth(time: Floats, msd: Floats, rate: float | None, fitted: Growth | None) -> Figure:
-    """The mean square displacement of an undamped run, with the slope that the spectrum predicts.
+    """The mean square displacement of an undamped run, with the slope that the spectrum predicts, as in the paper's
+    figure 4.
 
-    Parameters
-    ----------
-    time, msd : ndarray, shape (n,)
-        D(t), length^2; drawn where it is positive.
-    rate : float or None
-        Growth rate of D from the spectrum, 1 / time: 0 of a stable packing, None if it is not known.
-    fitted : Growth or None
-        The growth measured. Its slope lies beside D, a decade and a half above; without it the slope begins at the
-        noise, over the whole run.
-
-    Returns
-    -------
-    Figure
-        As the paper's figure 4.
+    D(t) is drawn where it is positive. `rate` is the growth rate of D from the spectrum, 0 of a stable packing, None if
+    it is not known. The predicted slope lies a decade and a half above the growth that was `fitted`; without it the
+    slope begins at the noise, over the whole run.
     """
     figure = Figure(figsize=(3.4, 2.7), layout="constrained")
     axes, label = figure.add_subplot(), "undamped run"
@@ -203,10 +193,7 @@ def draw_slips(panels: Sequence[Axes], slips: Sequence[Slip]) -> None:
 def draw_vibrations(found: Vibrations) -> Figure:
     """g with its standard error and its window, what the motions are like, and Q.
 
-    Parameters
-    ----------
-    found : Vibrations
-        Of all modes, each of which is a dot, or of random vectors.
+    Of all modes each is a dot; of random vectors there are none.
     """
     damped = bool(np.any(found.damping > 0))
     figure = Figure(figsize=(3.5, 5.6 if damped else 4.2), layout="constrained")
@@ -235,15 +222,8 @@ def draw_vibrations(found: Vibrations) -> Figure:
 
 @styled
 def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) -> Figure:
-    """Frequency and attenuation of plane waves over their wave number, beside the speeds of the elastic moduli.
-
-    Parameters
-    ----------
-    waves : sequence of PlaneWave
-        Along one direction.
-    moduli : ElasticModuli, optional
-        Their lines are those of its isotropic part.
-    """
+    """Frequency and attenuation of plane waves along one direction over their wave number, beside the speeds of the
+    isotropic part of the elastic moduli."""
     figure = Figure(figsize=(3.5, 4.4), layout="constrained")
     above, below = figure.subplots(2, sharex=True)
     most = max(wave.wave_number for wave in waves)

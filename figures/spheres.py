@@ -94,21 +94,11 @@ def shade_spheres(place: Floats, radius: Floats, colour: Floats, frame: AxesLimi
 def draw_spheres(
     axes: Axes, configuration: Configuration, style: dict[str, Any], widest: float, faces: Floats | None = None
 ) -> LineCollection:
-    """Spheres on axes, with floor and walls, the edges of a periodic box, and the bars of the contacts.
+    """Spheres on axes, with floor and walls, the edges of a periodic box, and the bars of the contacts from back to
+    front.
 
-    Parameters
-    ----------
-    style : dict
-        Colours of the bars.
-    widest : float
-        Width of the bar of the largest force, points; 0 for no bars.
-    faces : ndarray, shape (N, 3), optional
-        Colours of the spheres; by default grey, and red of those that are held.
-
-    Returns
-    -------
-    LineCollection
-        The bars, from back to front.
+    `style` has the colours of the bars, and `widest` is the width of the bar of the largest force, points; 0 for no
+    bars. `faces` (N, 3) are the colours of the spheres; by default grey, and red of those that are held.
     """
     c, (low, high) = configuration.contacts, corners_of(configuration)
     frame = left, right, bottom, top = frame_of(configuration)

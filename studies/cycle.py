@@ -63,14 +63,9 @@ def with_spring(packing: HasConfiguration, spring: float) -> Configuration:
 def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATION) -> dict[str, Any]:
     """Numbers of one state of a driven run, with the stiffness of the spring, force / length on each disk of the layer.
 
-    With less than `lone` disks that take part in a motion, the motion is that of one disk.
-
-    Returns
-    -------
-    dict
-        rests (whether forces balance), residual (the largest on a disk over the largest normal force), at_bound
-        (contacts at Coulomb's bound), and of `linear_state` NAME_sticking and NAME_sliding. A smoothed law has one
-        derivative at the bound, and the two are the same.
+    rests: whether forces balance; residual: the largest on a disk over the largest normal force; at_bound: contacts at
+    Coulomb's bound; NAME_sticking and NAME_sliding of `linear_state`. A smoothed law has one derivative at the bound,
+    and the two are the same. With less than `lone` disks that take part in a motion, the motion is that of one disk.
     """
     configuration = with_spring(packing, spring)
     sticking = linear_state(configuration, False, lone)
@@ -87,13 +82,10 @@ def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATIO
 def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE_PARTICIPATION) -> dict[str, Any]:
     """Linear motion about a state, with all contacts at Coulomb's bound sticking, or all sliding.
 
-    Returns
-    -------
-    dict
-        pairs : complex pairs of K without dissipation; undamped : growth rate of D without dissipation, 1 / time, of
-        complex pairs and of negative eigenvalues; damped : largest 2 Re s with dissipation, 1 / time, None if no motion
-        of several disks is known; lowest : least real part of the eigenvalues of K, 1 / time^2; alone : motions of one
-        disk that grow without dissipation. The other numbers leave out the motions of one disk.
+    pairs: complex pairs of K without dissipation; undamped: growth rate of D without dissipation, 1 / time, of complex
+    pairs and of negative eigenvalues; damped: largest 2 Re s with dissipation, 1 / time, None if no motion of several
+    disks is known; lowest: least real part of the eigenvalues of K, 1 / time^2; alone: motions of one disk that grow
+    without dissipation. The other numbers leave out the motions of one disk.
     """
     motion = Motion.of(configuration, sliding=sliding)
     modes = Modes.of_matrix(motion.stiffness)
@@ -184,33 +176,16 @@ COLUMNS_BEFORE_SLIPS = {
 def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambda rows, _: rows) -> list[str]:
     """Compute the eigenvalues of all states of a driven run, with the stiffness of its spring.
 
-    Parameters
-    ----------
-    path : Path
-        A drive.h5 that a spring has drawn.
-    output : Path
-        The folder: cycle.jsonl, which grows with each state, so that states of the same file are not computed again;
-        cycle.json, cycle.csv and the picture.
-    say, progress
-        As of :func:`~faultgouge.studies.sweep.run_sweep.run_sweep`.
-
-    Returns
-    -------
-    list of str
-        The states before the slips as a table, and what was written.
-
-    Raises
-    ------
-    SceneError
-        If the file is no drive.h5, or the layer of the run had no spring.
+    `path` is a drive.h5 that a spring has drawn. The folder `output` gets cycle.jsonl, which grows with each state, so
+    that states of the same file are not computed again; cycle.json, cycle.csv and the picture. Returns the states
+    before the slips as a table, and what was written. Raises SceneError if the file is no drive.h5, or the layer of the
+    run had no spring.
     """
     with RunFile(path) as file:
         settings = drive_of(file)
         if settings is None:
-            raise SceneError(
-                f"{path} is not a file of `faultgouge drive`: give such a file for the eigenvalues along its cycles, "
-                "or a scene for those along a ramp"
-            )
+            cure = "give such a file for the eigenvalues along its cycles, or a scene for those along a ramp"
+            raise SceneError(f"{path} is not a file of `faultgouge drive`: {cure}")
         if settings.spring == "rigid":
             raise SceneError(f"{path} is of a rigid drive, whose layer has no spring and no slips: draw with a spring")
         make_folder(output, "cycle.json")

@@ -116,16 +116,13 @@ def growth_rate(packing: Packing) -> float:
 def erupt(start: StartOfRun) -> Row:
     """A run from rest until it is over, on this process alone.
 
-    Returns
-    -------
-    dict
-        fx : load, force on each disk of the upper layer; damped : whether with dashpots or drag; rate : growth rate of
-        D from the spectrum, 1 / time, 0 of a stable packing; time : when the run was over; msd, kinetic_energy : the
-        largest D, length^2, and the largest kinetic energy; slip : largest displacement of the upper layer along x,
-        length; lost, gained, sliding : most contacts, in any sample, that were open, new, or slid; ended : when D first
-        reached a tenth of its largest value, time, None if it did not grow; ends : what ended the growth, one of
-        `ENDS`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger
-        of the two and of the kinetic energy; series : the samples as columns.
+    fx: load, force on each disk of the upper layer; damped: whether with dashpots or drag; rate: growth rate of D from
+    the spectrum, 1 / time, 0 of a stable packing; time: when the run was over; msd, kinetic_energy: the largest D,
+    length^2, and the largest kinetic energy; slip: largest displacement of the upper layer along x, length; lost,
+    gained, sliding: most contacts, in any sample, that were open, new, or slid; ended: when D first reached a tenth of
+    its largest value, time, None if it did not grow; ends: what ended the growth, one of `ENDS`; noise: largest D of
+    the first time unit; balance: kinetic energy less work, in units of the larger of the two and of the kinetic energy;
+    series: the samples as columns.
     """
     packing, residual, longest = start
     carrying, contacts, box = packing.loaded(residual), contact_pairs(packing), packing.box_length
@@ -319,10 +316,9 @@ def eruptions(scene: Scene, work: Work) -> Result:
         starts = [each for each in starts if not known(each[0].fx, each[0].damped)]
         for found in work.progress(work.map_rows(erupt, starts), len(starts)):
             rows.append(longest=settings.time, **found)
-            work.say(
-                f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
-                f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
-            )
+            size = f"D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}"
+            ends = f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
+            work.say(f"F_x = {found['fx']:g}: {size}, {ends}")
     runs, left_out = _runs(rows, settings), ("scene", "version", "series", "longest")
     if not runs:
         raise NoEquilibriumError(f"the packing bears none of the loads: it flows beyond F_x = {flows_beyond:g}")

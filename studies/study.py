@@ -92,10 +92,8 @@ class RegisteredStudy:
     row : callable, optional
         The task of a sweep: scene, function mu -> settled packing -> a row. A study with ``row=True`` is a task, too,
         whose row is what NAME.json holds.
-    reads, needs : tuple of str
-        Sections of a scene that are read besides its own, and those that it cannot do without.
-    section : type of Section, optional
-        Its own section, [NAME].
+    reads, needs, section : tuple of str, tuple of str, type of Section, optional
+        Sections of a scene that are read besides its own, those that it cannot do without, and its own section, [NAME].
     check : callable
         Raises SceneError for a scene without what is needed.
     figures : callable
@@ -109,11 +107,9 @@ class RegisteredStudy:
         What the progress counts, and what an interrupt leaves.
     example : str, optional
         The example of the help. A task with one is a command, too, which takes a scene or a sweep of this task.
-    gather : callable, optional
-        What a task makes of all rows of a sweep.
-    writes : mapping
-        The files that `gather` writes besides pictures, and the heads of those that are tables: files of others of
-        these names are refused before work begins.
+    gather, writes : callable, optional, mapping
+        What a task makes of all rows of a sweep; the files that it writes besides pictures, and the heads of those that
+        are tables: files of others of these names are refused before work begins.
     of_run : callable, optional
         What the command of a task does with a stored run, FILE.h5, in place of a scene.
     """
@@ -145,19 +141,9 @@ class RegisteredStudy:
     ) -> Result:
         """Compute the missing rows, and write numbers, pictures and page into a folder; make the folder if need be.
 
-        Under `mpiexec -n K` all K ranks call this; one hands out the work, the others take it.
-
-        Returns
-        -------
-        dict
-            What NAME.json holds; empty on ranks other than 0.
-
-        Raises
-        ------
-        SceneError
-            If the scene does not say what is needed.
-        OnsetError, NoEquilibriumError
-            If the packing has no onset, or bears none of the loads.
+        Under `mpiexec -n K` all K ranks call this; one hands out the work, the others take it. Returns what NAME.json
+        holds; empty on ranks other than 0. Raises SceneError if the scene does not say what is needed, OnsetError or
+        NoEquilibriumError if the packing has no onset, or bears none of the loads.
         """
         from ..figures.pages import render
 

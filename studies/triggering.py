@@ -186,16 +186,12 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> Row:
 
     Friction weakens where the layer is faster than v_0, length / time; the forecast is that of the weakened friction.
 
-    Returns
-    -------
-    dict
-        verdict : "does not weaken", the layer never exceeds v_0; "too short", the run ends before the jump is over;
-        "jump alone", D stays within `GROWTH_FACTOR` of the larger of the jump and the one foreseen; "grows", it goes
-        beyond both, at a rate that agrees with the spectrum's; "unexplained", it goes beyond both, at no such rate.
-        weakens_at : when the layer first exceeds v_0, time, or None. jump : largest D within the `JUMP_SHARE` of the
-        run that follows, length^2, or None. growth_in_decades : from the jump to the largest D afterwards, or None.
-        growth_after_the_jump : the numbers of a Growth, of D from ten times the jump to a tenth of its largest value;
-        None unless there is a decade between.
+    verdict: "does not weaken", the layer never exceeds v_0; "too short", the run ends before the jump is over; "jump
+    alone", D stays within `GROWTH_FACTOR` of the larger of the jump and the one foreseen; "grows", it goes beyond both,
+    at a rate that agrees with the spectrum's; "unexplained", it goes beyond both, at no such rate. weakens_at: when the
+    layer first exceeds v_0, time, or None. jump: largest D within the `JUMP_SHARE` of the run that follows, length^2,
+    or None. growth_in_decades: from the jump to the largest D afterwards, or None. growth_after_the_jump: the numbers
+    of a Growth, of D from ten times the jump to a tenth of its largest value; None unless there is a decade between.
     """
     time, msd, when = run["time"], run["msd"], time_of_crossing(run, v0)
     found: Row = {"weakens_at": when, "jump": None, "growth_in_decades": None, "growth_after_the_jump": None}
@@ -258,15 +254,12 @@ def sensitivity(run: Onset) -> Sensitivity:
 def eruption(scene: Scene, path: Sequence[Equilibrium], window: tuple[float, float]) -> Row:
     """The runs in a window between two onsets, and the control; path leads up to the upper one.
 
-    Returns
-    -------
-    dict
-        fx, fx_control : the middle of the window, and the control below it, force per disk of the upper layer; rate :
-        growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
-        perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
-        verdict, weakens_at, jump : whether D grows after its jump, when friction weakens, and the largest D shortly
-        after that (`judge`); fitted_rate : of D after the jump, or None; foreseen_jump : by linear theory,
-        length^2; perturbation_shows : whether the perturbed run differs from the unperturbed one.
+    fx, fx_control: the middle of the window, and the control below it, force per disk of the upper layer; rate: growth
+    rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed, perturbed,
+    weakening, control: largest D, length^2, of the three runs at fx, and with mu(v) at fx_control; verdict, weakens_at,
+    jump: whether D grows after its jump, when friction weakens, and the largest D shortly after that (`judge`);
+    fitted_rate: of D after the jump, or None; foreseen_jump: by linear theory, length^2; perturbation_shows: whether
+    the perturbed run differs from the unperturbed one.
     """
     middle = 0.5 * (window[0] + window[1])
     loads = middle, max(0.0, 2 * window[0] - middle)
@@ -305,9 +298,8 @@ def summary_of_rows(rows: Sequence[Row]) -> dict[str, Any]:
     ramps = [end for row in rows for end in row["result"].get("ramps", ())]
     eruptions = [found for row in rows if (found := row["result"].get("eruption"))]
     several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
-    lowered = [
-        row["result"]["lowered"] for row in several if row["says"] is None or row["result"]["lowered"] is not None
-    ]
+    tell = [(row["result"]["lowered"], row["says"] is None) for row in several]
+    lowered = [each for each, whole in tell if whole or each is not None]
     numbers: dict[str, Any] = {"onsets": []}
 
     def share_of(marks: Sequence[bool]) -> dict[str, Any]:

@@ -82,17 +82,9 @@ class Border(NamedTuple):
 class Slice:
     """A run of neighbouring eigenvalues.
 
-    Attributes
-    ----------
-    first : int
-        Number in the whole spectrum of the first of `values`.
-    values : ndarray, shape (M,)
-        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
-        out in the margins are not converged.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        Which of the M belong to this slice and to no other.
+    `values` (M,) increase: those of a margin, of which the outer ones are not converged, the slice's `own` ones, and
+    those of another margin; `vectors` (E, M) has their orthonormal eigenvectors. `first` is the number of the first of
+    `values` in the whole spectrum.
     """
 
     first: int
@@ -209,9 +201,7 @@ class SlicedSpectrum:
                 if np.all(residuals[order[inner]] <= self.sizes.vector_residual * spacing * inverse[order[inner]] ** 2):
                     break
             if krylov.full:
-                raise SliceError(
-                    f"the eigenvalues about {shift:.6g} are not in a Krylov space of {krylov.used} vectors"
-                )
+                raise SliceError(f"eigenvalues about {shift:.6g} are not in a Krylov space of {krylov.used} vectors")
             krylov.extend(krylov.used + self.sizes.looks * block)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
         start = own[0] - first - kept.start

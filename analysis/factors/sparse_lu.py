@@ -145,24 +145,11 @@ class Factors:
 def symmetric_lu(
     matrix: csc_array, *, ordered: bool = False, pivoting: float = 0.0, symmetric: bool = False
 ) -> Factors:
-    """The factors of a matrix with a symmetric pattern.
+    """The factors of a matrix with a symmetric pattern, whose coordinates may be `ordered` for elimination already.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (n, n)
-        Symmetric, or nearly so.
-    ordered : bool
-        Whether its coordinates are in the order of elimination already.
-    pivoting : float
-        Share of the largest entry of a column that its diagonal entry must have to be the pivot. With 0 it always is:
-        the factors are then those of a symmetric matrix, L D L^T, and their accuracy is to be looked at.
-    symmetric : bool
-        Whether it is symmetric to the bit; real then.
-
-    Raises
-    ------
-    SingularMatrixError
-        If a pivot is zero.
+    A diagonal entry is the pivot if it has at least the share `pivoting` of the largest entry of its column. With 0 it
+    always is: the factors are then those of a symmetric matrix, L D L^T, and their accuracy is to be looked at. A
+    `symmetric` matrix is real, and symmetric to the bit. Raises SingularMatrixError if a pivot is zero.
     """
     inside, order = _ordered(matrix, ordered)
     compiled = _library() if pivoting == 0 and np.isrealobj(matrix.data) else None

@@ -48,28 +48,14 @@ class SpectrumError(FaultgougeError):
 
 
 def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple[Complexes, Modes]:
-    """All eigenvalues of a sparse matrix that is nearly symmetric.
+    """All eigenvalues of a sparse matrix that is nearly symmetric, such as M^(-1/2) K M^(-1/2) of the coordinates that
+    feel a force.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csr_array, shape (n, n)
-        A, such as M^(-1/2) K M^(-1/2) of the coordinates that feel a force; its pattern is symmetric.
-    own : int
-        Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors.
-    least : int
-        Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time.
+    A slice has `own` eigenvalues: more cost more orthogonalisation, fewer cost more factors. LAPACK finds all of up to
+    `least` coordinates, which a space of the largest size would hold, in no less time.
 
-    Returns
-    -------
-    values : ndarray of complex, shape (n,)
-        Sorted by real part, then imaginary part.
-    marked : Modes
-        Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
-
-    Raises
-    ------
-    SpectrumError
-        If not all are found.
+    Returns the values, sorted by real part, then imaginary part, and the modes of those with a positive imaginary part,
+    of those that are real and negative, and of real ones that are oblique. Raises SpectrumError if not all are found.
     """
     count, island = connected_components(matrix, directed=False)
     values, parts = [], []
@@ -146,9 +132,8 @@ def eigenvalues_about(
     size = matrix.shape[0]
     factors = general_lu(csc_array(matrix - shift * eye_array(size)), ordered=True)
     random = np.random.default_rng(block)
-    right, left = (
-        BlockKrylov(partial(factors.solve, trans=side), random.standard_normal((block, size)), most) for side in "NT"
-    )
+    starts = ((partial(factors.solve, trans=side), random.standard_normal((block, size))) for side in "NT")
+    right, left = (BlockKrylov(solve, start, most) for solve, start in starts)
     while True:
         distances, radii = [], []
         for space in (right, left):
@@ -174,9 +159,8 @@ def eigenvalues_about(
     bases = []
     try:
         for space in (right, left):
-            *_, turn, count = schur(
-                space.square, output="real", sort=lambda a, b: np.hypot(a, b) * radius > 1, check_finite=False
-            )
+            within = {"sort": lambda a, b: np.hypot(a, b) * radius > 1, "check_finite": False}
+            *_, turn, count = schur(space.square, output="real", **within)
             bases.append(space.basis[: space.used].T @ turn[:, :count])
         v, u = bases
         both = u.T @ v

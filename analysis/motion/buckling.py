@@ -20,13 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from ..factors.sparse_lu import DIAGONAL_PIVOT, negative_pivots, symmetric_lu
 from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
-from .eigenvalues import (
-    SAFETY,
-    imbalance,
-    is_negative,
-    operator_rounding,
-    zero_uncertainties,
-)
+from .eigenvalues import SAFETY, imbalance, is_negative, operator_rounding, zero_uncertainties
 from .modes import Modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 

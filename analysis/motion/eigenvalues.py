@@ -66,9 +66,8 @@ def mass_weighted(stiffness: csr_array, packing: HasConfiguration) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(packing.coordinate_mass)
     rows = np.repeat(scale, np.diff(stiffness.indptr))
-    return csr_array(
-        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
-    )
+    columns = stiffness.indices
+    return csr_array((rows * stiffness.data * scale[columns], columns, stiffness.indptr), shape=stiffness.shape)
 
 
 def active_coordinates(matrix: csr_array) -> Indices:
@@ -117,16 +116,8 @@ def zero_uncertainties(
 ) -> Floats:
     """The same of modes that are known, shape (k,): forces on particles that take no part do not count.
 
-    Parameters
-    ----------
-    packing : Configuration or Packing
-        In equilibrium.
-    rounding : float
-        u |A|_F, 1 / time^2.
-    particle : ndarray of int, shape (n,)
-        Whose coordinates the rows of the vectors are.
-    left, right : ndarray of complex, shape (n, k)
-        Unit vectors y and x of the modes: to first order an eigenvalue changes by y^H dA x / y^H x.
+    `left` and `right` (n, k) have the unit vectors y and x of the modes: to first order an eigenvalue changes by y^H dA
+    x / y^H x. `particle` (n,) says whose coordinates their rows are; `rounding` is u |A|_F, 1 / time^2.
     """
     return np.asarray(SAFETY * rounding + imbalance(packing)[particle] @ (np.abs(left) * np.abs(right)))
 
@@ -143,17 +134,8 @@ def is_zero(values: Complexes, overlap: Floats, alike: float, uncertainty: Float
 
 
 def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
-    """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty.
-
-    Parameters
-    ----------
-    eigenvalue : complex
-        A computed eigenvalue.
-    overlap : float
-        |y^H x| of its unit vectors.
-    rounding : float
-        u |A|_F of the operator.
-    """
+    """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty; `overlap` is |y^H x| of its
+    unit vectors, and `rounding` u |A|_F of the operator."""
     return bool(abs(eigenvalue.imag) * overlap > SAFETY * rounding)
 
 
@@ -162,16 +144,8 @@ def growing_undamped(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which eigenvalues of A grow with oscillation, as complex pairs, and which without, as negative ones.
 
-    Parameters
-    ----------
-    values : ndarray of complex
-        Eigenvalues, 1 / time^2.
-    overlap : ndarray
-        |y^H x| of their unit vectors.
-    rounding : float
-        u |A|_F, 1 / time^2.
-    zero : float or ndarray
-        The uncertainty of an eigenvalue of zero, of all modes alike or of each, 1 / time^2.
+    `overlap` is |y^H x| of their unit vectors, `rounding` u |A|_F, and `zero` the uncertainty of an eigenvalue of zero,
+    of all modes alike or of each; 1 / time^2.
     """
     return np.abs(values.imag) * overlap > SAFETY * rounding, is_negative(values, overlap, rounding, zero)
 

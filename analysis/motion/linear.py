@@ -51,20 +51,10 @@ LAPACK_UP_TO = 2000
 
 
 def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None = None) -> Linear:
-    """Whether linear motion grows.
+    """Whether linear motion grows; where no verdict depends on it, not `decides`, fast growth alone in a large packing.
 
-    Parameters
-    ----------
-    motion : Motion
-        The operators.
-    decides : bool
-        Whether a verdict depends on this motion: otherwise fast growth alone is looked for in a large packing.
-    time : float, optional
-        How long a random state is followed, where there is no certificate; some ten minutes by default.
-
-    Returns
-    -------
-    Linear
+    Where there is no certificate, a random state is followed for the `time`, by default for as long as some ten minutes
+    of work allow.
     """
     size, a, g, packing = len(motion.active), motion.stiffness, motion.damping, motion.configuration
     if not size:
@@ -90,10 +80,8 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
             if below == 0 and above is not None:
                 said = "the stiffness is symmetric, and its energy positive (proved)"
                 return Linear(True, 0.0, free=above, said=said)
-        why = (
-            f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a "
-            f"packing of {size} coordinates: give the packing its dashpots, or search it in slices by `onset`"
-        )
+        why = f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a "
+        why += f"packing of {size} coordinates: give the packing its dashpots, or search it in slices by `onset`"
         return replace(found, reasons=(why,))
     kept = opposed(motion)
     try:
@@ -142,16 +130,9 @@ def _by_lapack(motion: Motion) -> Linear:
 def all_rates(motion: Motion) -> tuple[Complexes, NDArray[np.bool_], int, float]:
     """All eigenvalues s of small motion, by LAPACK.
 
-    Returns
-    -------
-    values : ndarray of complex, shape (k,)
-        s with Im s >= 0, the fastest growing first, 1 / time. Motions that no force opposes are left out.
-    grows : ndarray of bool, shape (k,)
-        Those with Re s > 0 beyond rounding.
-    free : int
-        Motions that no force opposes, and that drift.
-    error : float
-        Of Re s that is perfectly conditioned, 1 / time.
+    Returns s with Im s >= 0, the fastest growing first, without motions that no force opposes; which have Re s > 0
+    beyond rounding; how many motions drift, as no force opposes them; and the error of Re s that is perfectly
+    conditioned, 1 / time.
     """
     packing, rounding = motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data)
     if motion.dissipative:

@@ -68,22 +68,13 @@ class OneSidedSystem:
     """The equations of one configuration, in mass-weighted coordinates, by K and C of sticking contacts.
 
     A state has several motions, in columns: `time`, displacement `z` and velocity `v`, shape (E, P), and what contacts
-    remember: `p` of sliders, shape (B, P), and `r`, shape (R, P), of contacts with two derivatives.
+    remember: `p` of sliders, shape (B, P), and `r`, shape (R, P), of contacts with two derivatives. Of the sliders
+    `grip` (E, B), `excess` and `viscous_excess` (B, E) are G, Y and Z; of contacts with two derivatives `rates` (R, E)
+    has the rates of the overlaps, and `wear` (E, R) is B.
 
-    Attributes
-    ----------
-    stable_step : float
-        The largest stable time step.
-    grip, excess, viscous_excess : shapes (E, B), (B, E) and (B, E)
-        G, Y and Z of the sliders.
-    rates, wear : shapes (R, E) and (E, R)
-        Rates of the overlaps of contacts with two derivatives, and B.
-    changes : ContactChanges
-        Which motions take contacts to another state.
-    missing : ndarray, shape (B, 1)
-        What contacts that count as at Coulomb's bound lack to the bound, force.
-    residual_force : ndarray, shape (E, 1)
-        What is left where the packing is said to rest.
+    `changes` says which motions take contacts to another state. `missing` (B, 1) is what contacts that count as at
+    Coulomb's bound lack to the bound, force; `residual_force` (E, 1) what is left where the packing is said to rest;
+    `stable_step` the largest stable time step.
     """
 
     def __init__(self, motion: Motion) -> None:

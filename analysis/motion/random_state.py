@@ -258,20 +258,9 @@ def follow_decay(
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 
-    Parameters
-    ----------
-    motion : Motion
-        A and G.
-    kept : scipy.sparse.csr_array, shape (n, m)
-        Orthonormal basis of the motion that counts.
-    why : str
-        Why there is no certificate: a clause.
-    time : float, optional
-        How long at the most; by default as long as `work` allows.
-    searched : float
-        Growth rate of D, 1 / time, above which nothing grows, as is known already.
-    work : float
-        Multiplications with entries of A and G.
+    The columns of `kept` (n, m) are an orthonormal basis of the motion that counts; `why` is a clause, why there is no
+    certificate. The motion is followed for the `time` at the most, by default for as long as `work`, multiplications
+    with entries of A and G, allows. Growth of D above the rate `searched` is known not to exist.
     """
     a, g, c, size = motion.stiffness, motion.damping, motion.configuration, len(motion.active)
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((size, 2))
@@ -305,10 +294,8 @@ def follow_decay(
         return replace(found, free=free)
     bound = min(searched, found.searched)
     would = f"`time` = {needed:.2g} would do" if np.isfinite(needed) else "in which motion did not decay"
-    reason = (
-        f"{why}; no motion was found to grow, and D grows no faster than exp({bound:.2g} t), as motion from a random "
-        f"state shows within t = {now:.4g}; {would}"
-    )
+    shows = f"as motion from a random state shows within t = {now:.4g}"
+    reason = f"{why}; no motion was found to grow, and D grows no faster than exp({bound:.2g} t), {shows}; {would}"
     return replace(found, free=free, searched=bound, reasons=(reason,))
 
 

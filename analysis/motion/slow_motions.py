@@ -39,27 +39,13 @@ KRYLOV = 300
 def slow_motions(
     a: csr_array, g: csr_array, kept: csr_array, reference: float, drifts: int
 ) -> tuple[Complexes, Floats, Callable[[Floats], Floats]] | None:
-    """The slowest motions; None if the Krylov spaces do not hold any well enough.
+    """The slowest motions by A and G; None if the Krylov spaces do not hold any well enough.
 
-    Parameters
-    ----------
-    a, g : scipy.sparse.csr_array, shape (n, n)
-        A, 1 / time^2, and G, 1 / time.
-    kept : scipy.sparse.csr_array, shape (m, n)
-        Orthonormal basis of their coordinates: states are of m coordinates.
-    reference : float
-        omega_0, 1 / time: a tenth of it is the shift.
-    drifts : int
-        Motions that no force opposes.
+    States are of the m coordinates of the orthonormal basis `kept` (m, n). A tenth of the `reference` omega_0 is the
+    shift, and no force opposes `drifts` motions.
 
-    Returns
-    -------
-    s : ndarray of complex, shape (k,)
-        Eigenvalues but those of drift, 1 / time.
-    error : ndarray, shape (k,)
-        Of s, 1 / time.
-    leave : callable
-        Takes these motions and drift out of a state u, shape (2m,).
+    Returns the eigenvalues s but those of drift, their errors, 1 / time, and a function that takes these motions and
+    drift out of a state u, shape (2m,).
     """
     shift, size = 0.1 * reference, a.shape[0]
     try:
@@ -98,9 +84,8 @@ def slow_motions(
     if known <= 2 * drifts:
         return None
     # up to a place where both spaces part the motions from those beyond
-    apart = [
-        k for k in range(2 * drifts + 1, known + 1) if all(sizes[k] < 0.97 * sizes[k - 1] for _, sizes, _ in spaces)
-    ]
+    counts = range(2 * drifts + 1, known + 1)
+    apart = [k for k in counts if all(sizes[k] < 0.97 * sizes[k - 1] for _, sizes, _ in spaces)]
     if not apart:
         return None
     count = apart[-1]

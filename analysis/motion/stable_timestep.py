@@ -84,9 +84,7 @@ class StableTimestep(float):
 
 
 def stable_timestep(
-    of: float | HasConfiguration,
-    stiffness: csr_array | None = None,
-    damping: csr_array | None = None,
+    of: float | HasConfiguration, stiffness: csr_array | None = None, damping: csr_array | None = None
 ) -> StableTimestep:
     """The largest stable time step of velocity Verlet.
 

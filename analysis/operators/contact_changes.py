@@ -44,24 +44,16 @@ class Multiples(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ContactChanges:
-    """The contacts and gaps of a configuration, in rows for products with displacements.
+    """The contacts and gaps of a configuration, in rows for products with displacements; C contacts, G gaps.
 
-    Attributes
-    ----------
-    rows : scipy.sparse.csr_array or ndarray, shape (3C + G, coordinates)
-        Changes of the tangential forces along f_t, and across, of the overlaps, and of the gaps, which they close.
-    viscous : scipy.sparse.csr_array or ndarray, shape (3C, coordinates)
-        Those that dashpots make, by velocities, and of Coulomb's bound.
-    tangential, bound, bound_slope, overlap : ndarray, shape (C, 1)
-        |f_t|, mu f_n, force; d (mu f_n)/d delta, force / length; delta, length.
-    sticks : ndarray of bool, shape (C, 1)
-        Contacts below Coulomb's bound that may reach it.
-    slides, wears : ndarray of int, shapes (B,) and (R,)
-        Numbers of the contacts that slide on ahead, and of those with two derivatives.
-    worn : ndarray, shape (2, R, 1)
-        Changes of the tangential force along and across by the path of the overlap.
-    gap : ndarray, shape (G, 1)
-        Distances of surfaces, length.
+    `rows` (3C + G, coordinates) give the changes of the tangential forces along f_t, and across, of the overlaps, and
+    of the gaps, which they close; `viscous` (3C, coordinates) those that dashpots make, by velocities, and of Coulomb's
+    bound. `tangential`, `bound`, `bound_slope`, `overlap` (C, 1) are |f_t|, mu f_n, d (mu f_n)/d delta and delta; `gap`
+    (G, 1) has distances of surfaces.
+
+    `sticks` (C, 1) are the contacts below Coulomb's bound that may reach it; `slides` (B,) and `wears` (R,) the numbers
+    of those that slide on ahead, and of those with two derivatives. `worn` (2, R, 1) has the changes of the tangential
+    force of the latter, along and across, by the path of the overlap.
     """
 
     rows: csr_array | Floats
@@ -84,10 +76,8 @@ class ContactChanges:
         along = _directions(c.tangential_force, c.normal)
         across = np.cross(c.normal, along)
         coupling = 0.5 * (c.closing + c.parting)
-        gains = [
-            tangential_rows(configuration, each, c.tangential_stiffness, np.einsum("ca,ca->c", coupling, each))
-            for each in (along, across)
-        ]
+        ways = ((each, np.einsum("ca,ca->c", coupling, each)) for each in (along, across))
+        gains = [tangential_rows(configuration, each, c.tangential_stiffness, part) for each, part in ways]
         overlaps = overlap_rows(configuration)
         bears = np.isfinite(c.friction) & (c.friction > 0) & (c.normal_force > 0)
         bound = np.where(bears, c.friction, 0.0)

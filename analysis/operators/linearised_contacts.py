@@ -15,14 +15,8 @@ def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_ar
     r"""The part of the force that K of the mean derivative lacks, of contacts whose derivative differs between closing
     and parting.
 
-    With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
-
-    Returns
-    -------
-    n : scipy.sparse.csr_array, shape (C, coordinates)
-        Rates of the overlaps by velocities.
-    b : scipy.sparse.csr_array, shape (coordinates, C)
-        Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
+    With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`. Returns N, shape (C,
+    coordinates), and B, shape (coordinates, C), half of the difference of both derivatives; force / length.
     """
     c = configuration.contacts
     difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))

@@ -40,20 +40,11 @@ from .linearised_contacts import tangential_rows, unit_forces
 
 @dataclass(frozen=True, eq=False)
 class Sliders:
-    """The contacts at Coulomb's bound of a configuration, B of them.
+    """The contacts at Coulomb's bound of a configuration: the numbers `contact` (B,) of them among all.
 
-    Attributes
-    ----------
-    contact : ndarray of int, shape (B,)
-        Their numbers among all contacts.
-    force : scipy.sparse.csr_array, shape (coordinates, B)
-        G, forces (F, T/R) of unit tangential forces.
-    excess, viscous_excess : scipy.sparse.csr_array, shape (B, coordinates)
-        Y, force / length, and Z, force time / length.
-    rectified : ndarray, shape (B,)
-        h, force / length.
-    viscous : ndarray of bool, shape (B,)
-        Whether p remembers the excess of dashpots, too.
+    `force` (coordinates, B) is G, forces (F, T/R) of unit tangential forces; `excess` and `viscous_excess` (B,
+    coordinates) are Y, force / length, and Z, force time / length; `rectified` (B,) is h, force / length; `viscous`
+    (B,) says whether p remembers the excess of dashpots, too.
     """
 
     contact: Indices
@@ -84,13 +75,12 @@ def sliders_of(configuration: Configuration) -> Sliders:
     along = c.tangential_force / np.linalg.norm(c.tangential_force, axis=1, keepdims=True)
     coupling = np.einsum("ca,ca->c", 0.5 * (c.closing + c.parting), along)
     friction = c.friction / c.normal_force
+    loss = -friction * c.normal_dashpot * c.viscous_slider
     return Sliders(
         contact=which,
         force=csr_array(unit_forces(here, along).T),
         excess=tangential_rows(here, along, c.tangential_stiffness, coupling - friction * c.normal_stiffness),
-        viscous_excess=tangential_rows(
-            here, along, c.tangential_dashpot, -friction * c.normal_dashpot * c.viscous_slider
-        ),
+        viscous_excess=tangential_rows(here, along, c.tangential_dashpot, loss),
         rectified=0.5 * np.einsum("ca,ca->c", c.closing - c.parting, along),
         viscous=c.viscous_slider,
     )

@@ -230,23 +230,13 @@ def growing_range(time: ArrayLike, msd: ArrayLike, upper: float) -> tuple[float,
 class GrowthOfRun:
     """Whether D of an undamped run grew, and what the spectrum of its start says.
 
-    Attributes
-    ----------
-    measured : Growth or None
-        The exponential fitted to D; None if there is none.
-    predicted : float or None
-        Growth rate of D from the spectrum, 1 / time: 0 of a stable packing, None where it was not computed.
-    pairs, negative : int
-        Complex pairs and negative eigenvalues of the start, with dissipation the motions that grow and oscillate, and
-        those that grow and do not.
-    enough : bool or None
-        Whether the time was enough to see growth; None where nothing grows, or nobody knows.
-    needed : float or None
-        About how long a run has to be for D to leave the noise and be followed, time; None where nothing grows.
-    weakened : float or None
-        The smallest friction coefficient of the run, if friction weakened.
-    says : str
-        The outcome in a sentence, or why there is no measured rate.
+    `measured` is the exponential fitted to D, None if there is none; `predicted` the growth rate of D from the
+    spectrum, 0 of a stable packing, None where it was not computed. `pairs` and `negative` count complex pairs and
+    negative eigenvalues of the start, with dissipation the motions that grow and oscillate, and those that grow and do
+    not. `enough` says whether the time was enough to see growth, and `needed` about how long a run has to be for D to
+    leave the noise and be followed; both are None where nothing grows, `enough` also where nobody knows. `weakened` is
+    the smallest friction coefficient of the run, if friction weakened. `says` is the outcome in a sentence, or why
+    there is no measured rate.
     """
 
     measured: Growth | None

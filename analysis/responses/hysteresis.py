@@ -26,21 +26,12 @@ from ..packing.packing import Packing
 
 @dataclass(frozen=True)
 class Hysteresis:
-    """A path of loads that comes back.
+    """A path of loads that comes back: its last F_x is `fx`, where it has been before, at the equilibrium number
+    `begin`.
 
-    Attributes
-    ----------
-    fx : float
-        The last F_x, where the path has been before.
-    begin : int
-        Which equilibrium that was, counted from 0.
-    remaining : float
-        Displacement of the upper layer along x since then, length.
-    work : float
-        Of the loads on all disks of the layer since then, force length.
-    closes : bool
-        Whether what remains is no more than rounding: 1e-9 of how far the layer has moved in
-        between.
+    Since then `remaining` is left of the displacement of the upper layer along x, and the loads on all disks of the
+    layer have done the `work`. The path `closes` if what remains is rounding: 1e-9 of how far the layer has moved in
+    between.
     """
 
     fx: float

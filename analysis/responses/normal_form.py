@@ -66,18 +66,13 @@ neighbouring ones may win by their phase, those further out lie lower on the env
 class NormalForm:
     """Two modes near their coalescence; of a packing with where they stand in its coordinates.
 
-    Parameters
-    ----------
-    delta : float
-        Half the distance of the uncoupled eigenvalues over their mean, 0 < delta < 1.
-    epsilon : float
-        1 - eta/delta, the distance from the coalescence; at most 1, negative where the pair is complex. It is
-        given rather than eta because eta loses the digits of a small one.
-    frequency : float
-        Square root of the mean eigenvalue, radian / time: the unit of time of the equations is its inverse.
-    right, left : ndarray, shape (n, 2)
-        V, orthonormal directions of the two coordinates x in mass-weighted coordinates of the packing, and W, with
-        W^T V = 1: coordinates of a displacement z are W^T z.
+    `delta` is half the distance of the uncoupled eigenvalues over their mean, 0 < delta < 1. `epsilon`, 1 - eta/delta,
+    is the distance from the coalescence, at most 1, and negative where the pair is complex: eta would lose the digits
+    of a small one. `frequency` is the square root of the mean eigenvalue; its inverse is the unit of time of the
+    equations.
+
+    `right` (n, 2) is V, orthonormal directions of the two coordinates x in mass-weighted coordinates of the packing,
+    and `left` W, with W^T V = 1: coordinates of a displacement z are W^T z.
     """
 
     delta: float
@@ -143,26 +138,13 @@ class NormalForm:
         return np.outer(even, ORTHOGONAL) + np.outer(odd, traceless @ ORTHOGONAL)
 
     def amplitude(self, damping_time: float | None = None) -> float:
-        """Largest |x(t)| of the response to a start across v*, over the first beat of the two modes.
+        """Largest |x(t)| of the response to a start across v*, over the first beat of the two modes, by default without
+        damping.
 
-        Later beats are lower by the damping or, without, higher than the first by a share (pi d/2s)^2/2 at most:
-        `gain` bounds them all.
-
-        Parameters
-        ----------
-        damping_time : float, optional
-            tau; none by default.
-
-        Returns
-        -------
-        float
-            The exact maximum, at least the 1 of the start; infinite for a complex pair without damping, and for one
-            that grows faster than the damping.
-
-        Raises
-        ------
-        ValueError
-            If the damping time is not positive, or so short that nothing oscillates.
+        It is exact, and at least the 1 of the start; infinite for a complex pair without damping, and for one that
+        grows faster than the damping. Later beats are lower by the damping or, without, higher than the first by a
+        share (pi d/2s)^2/2 at most: `gain` bounds them all. Raises ValueError if the damping time is not positive, or
+        so short that nothing oscillates.
         """
         from scipy.optimize import minimize_scalar
 

@@ -52,20 +52,10 @@ digits. Such a frequency is moved by twice as much: a part in a million of the r
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Motion of a packing about its equilibrium.
+    """Motion of a packing about its equilibrium: `displacement` q = (x.., y.., R theta..) and `velocity`, shape (T,
+    3N), at `time` (T,).
 
-    Attributes
-    ----------
-    time : ndarray, shape (T,)
-        Times.
-    displacement : ndarray, shape (T, 3N)
-        q = (x.., y.., R theta..) from the equilibrium, length.
-    velocity : ndarray, shape (T, 3N)
-        Its time derivative, length / time.
-    top : ndarray of bool, shape (N,)
-        The disks of the upper layer; none of a Configuration.
-    dimension : int
-        2 of disks, 3 of spheres.
+    `top` (N,) are the disks of the upper layer, none of a Configuration; `dimension` is 2 of disks, 3 of spheres.
     """
 
     time: Floats

@@ -149,17 +149,9 @@ def find_slips(
 
 @dataclass(frozen=True)
 class DrivenFriction:
-    """Friction F/F_y of a layer that sticks and slips.
-
-    Attributes
-    ----------
-    largest : float
-        The largest of the run.
-    mean : float
-        Mean over time from the first slip on, or over the whole run without slips.
-    before, after : float or None
-        Means over the slips of the friction before and after them.
-    """
+    """Friction F/F_y of a layer that sticks and slips: the `largest` of the run, and the `mean` over time from the
+    first slip on, or over the whole run without slips; `before` and `after` are the means over the slips of the
+    friction before and after them, None without slips."""
 
     largest: float
     mean: float

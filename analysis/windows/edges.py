@@ -41,14 +41,8 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
     the jump. The root may be one of the two loads but for rounding, which may make the signs at both equal. The five
     points are then on its one side.
 
-    Returns
-    -------
-    fx, error : float
-        The root, with twice the scatter over the slope; or the jump, with half of its bracket.
-    loads : list of float
-        The five that give the root, or the one that is the root, or the two on either side of the jump.
-    smooth : bool
-        Whether it is a root.
+    Returns the root, with twice the scatter over the slope, or the jump, with half of its bracket; the five loads that
+    give the root, or the one that is the root, or the two on either side of the jump; and whether it is a root.
     """
     values, span = {below: value(below), above: value(above)}, above - below
     ends, last_place = (values[below], values[above]), float(np.spacing(max(abs(below), abs(above))))

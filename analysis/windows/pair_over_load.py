@@ -86,21 +86,11 @@ def _largest(state: Motions, weight: Floats) -> list[int]:
 
 
 def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalForm]:
-    """The normal form of one pair, through equilibria on the way to its onset.
+    """The normal form of one pair, through equilibria on the way to its onset, one for each packing.
 
-    Parameters
-    ----------
-    packings : sequence of Packing
-        Equilibria in order of their distance from the onset, nearest first, close enough for the planes of the
-        pair to be recognised.
-    eigenvalue : float
-        The double eigenvalue at the onset, as of :class:`~faultgouge.analysis.Window`, 1 / time^2: the nearest two of
-        the first packing are the pair.
-
-    Returns
-    -------
-    list of NormalForm
-        In the order of the packings.
+    The packings are in order of their distance from the onset, nearest first, and close enough for the planes of the
+    pair to be recognised. The two eigenvalues of the first that are nearest to `eigenvalue`, the double one at the
+    onset, 1 / time^2, are the pair.
     """
     found = []
     for pair in _follow_pair(packings, eigenvalue):

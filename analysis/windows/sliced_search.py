@@ -77,15 +77,9 @@ class SlicedSearch:
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         """The first window along a ramp, if there is one, and the increments before it that are in doubt.
 
-        Loads beyond the one above the onset are not asked for.
-        The window's end is None where its motion grows at the next load.
-
-        Raises
-        ------
-        NoEquilibriumError
-            If a load has none before a motion is seen to grow.
-        SliceError
-            If a part of the spectrum is not found.
+        Loads beyond the one above the onset are not asked for. The window's end is None where its motion grows at the
+        next load. Raises NoEquilibriumError if a load has none before a motion is seen to grow, and SliceError if a
+        part of the spectrum is not found.
         """
         here, first = self.at(float(loads[0])), None
         for load in loads[1:]:

@@ -137,26 +137,13 @@ def slices(
     ranks: Ranks = ALONE,
     known: Sequence[Border] = (),
 ) -> Iterator[Slice]:
-    """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
+    """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum, without `known`
+    slices.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse.csc_array, shape (E, E)
-        Symmetric.
-    margin : int
-        Further modes wanted on either side of a slice.
-    limits, factorise
-        Sizes, and how to factorise S - shift.
-    ranks : Ranks
-        Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
-        way beyond the one that is asked for. All ranks must come to the end of their slices.
-    known : sequence of Border
-        Slices that are left out.
-
-    Raises
-    ------
-    SliceError
-        If eigenvalues do not converge, or neighbouring slices disagree.
+    Each slice has a `margin` of further modes on either side. `factorise` factors matrix - shift. The `ranks` share the
+    slices; those of this rank are found. Its threads are also the slices at the most that are under way beyond the one
+    that is asked for. All ranks must come to the end of their slices. Raises SliceError if eigenvalues do not converge,
+    or neighbouring slices disagree.
     """
     from threadpoolctl import threadpool_limits  # nothing else needs it
 
@@ -203,16 +190,10 @@ def slices(
 
 
 class Candidate(NamedTuple):
-    """A motion that begins to grow in its slice.
+    """A motion that begins to grow in its slice, on the `increment` with this number between some loads.
 
-    Attributes
-    ----------
-    increment : int
-        On which of the increments between some loads.
-    onset, inside : float
-        The load from which on it grows, and one at which it still does; force per top disk.
-    value, slope : complex
-        lambda, or s with dissipation, at the load `inside`, and its change over the load.
+    It grows from the load `onset` on, and still does at the load `inside`, where `value` is lambda, or s with
+    dissipation, and `slope` its change over the load.
     """
 
     increment: int
@@ -251,9 +232,8 @@ def kept_results(folder: Path) -> list[SliceResult]:
     damaged = OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile
     for path in folder.glob("*-*.npz"):
         with suppress(*damaged), np.load(path) as data:
-            modes, border, motions, crowded = (
-                data[name].tolist() for name in ("modes", "border", "motions", "crowded")
-            )
+            names = ("modes", "border", "motions", "crowded")
+            modes, border, motions, crowded = (data[name].tolist() for name in names)
             candidates = [Candidate(int(k.real), a.real, b.real, *rest) for k, a, b, *rest in motions]
             found.append(SliceResult(Border(tuple(modes), *border), candidates, crowded))
     return sorted(found, key=lambda each: each.border.modes)

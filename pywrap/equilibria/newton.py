@@ -96,27 +96,10 @@ def iterate_newton(
     guess: Guess | None = None,
     patient: bool = False,
 ) -> Trial | None:
-    """Newton's method from one equilibrium.
+    """Newton's method from one equilibrium, at any load, to the load fx; None where the iteration does not converge.
 
-    Parameters
-    ----------
-    engine : Engine
-        LAMMPS with this packing.
-    base : Packing
-        The equilibrium, at any load.
-    fx : float
-        The load that is wanted: force along x on each disk of the upper layer.
-    force_tolerance : float, optional
-        Residual to stop at. By default the iteration ends at the floor.
-    guess : Guess, optional
-        By default it starts without a displacement.
-    patient : bool
-        Whether a residual that falls slowly is good enough to go on, see `PATIENCE`.
-
-    Returns
-    -------
-    Trial, or None
-        In balance; None where the iteration does not converge.
+    It begins at the `guess`, by default without a displacement, and stops at the residual `force_tolerance`, by default
+    at the floor of rounding. A `patient` iteration goes on while its residual falls slowly, see `PATIENCE`.
     """
 
     def bearing(trial: Trial, least: float) -> Floats:

@@ -45,17 +45,8 @@ class StiffnessFactors(NamedTuple):
 
 
 def factor_stiffness(trial: Trial, floor: float, since: ContactGraph | None = None) -> StiffnessFactors | None:
-    """Factor K; None if nothing is held.
-
-    Parameters
-    ----------
-    trial : Trial
-        Where K is taken.
-    floor : float
-        Force that a contact has to exceed.
-    since : ContactGraph, optional
-        The contacts where the displacement began; by default they are those of the trial.
-    """
+    """Factor K of a trial; None if nothing is held. `floor` is the force that a contact has to exceed, and `since` has
+    the contacts where the displacement began, by default those of the trial."""
     graph, law = trial.graph, trial.derivatives
     loaded, old = law.normal_force > floor, None if since is None else graph.old(since)
     if old is not None:

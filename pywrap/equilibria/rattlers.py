@@ -37,17 +37,9 @@ WIDENING = 0.05
 
 
 def clear_rattlers(packing: Packing, idle: Indices) -> Packing:
-    """Move disks whose contacts carry nothing to the middle of their cages.
+    """Move disks whose contacts carry nothing to the middle of their cages, and take these contacts away.
 
-    Parameters
-    ----------
-    packing : Packing
-        At rest, without friction: its contacts have no history that could be lost.
-
-    Returns
-    -------
-    Packing
-        The same but for the positions of these disks, and their contacts, which are gone.
+    The packing is at rest, without friction: its contacts have no history that could be lost.
     """
     position = packing.position.copy()
     position[idle] = middle_of_cage(packing, idle)
@@ -60,18 +52,8 @@ def place_disks(packing: Packing, position: Floats) -> Packing:
 
 
 def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
-    """Where the narrowest gap between a disk and its neighbours is widest, one disk after the other.
-
-    Parameters
-    ----------
-    packing : Packing
-        Whose other disks are the cages.
-
-    Returns
-    -------
-    ndarray, shape (D, 2)
-        Their places, length.
-    """
+    """Where the narrowest gap between a disk and its neighbours, the other disks of the packing, is widest, one disk
+    after the other, shape (D, 2)."""
     radius, box = packing.radius, packing.box_length
     position = packing.position.copy()
     tree = neighbour_tree(position, box)
@@ -104,20 +86,11 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
 
 
 def highest_corner(sides: Floats, bounds: Floats) -> Floats:
-    """Solve a linear program in three unknowns: the point where three bounds meet and the third unknown is largest.
+    """Solve a linear program in three unknowns: the point z where three bounds meet and the third unknown is largest.
 
-    A cage has up to twenty bounds. All threes of them are looked at, in a fifth of the time of a general solver, whose
-    import alone takes a tenth of the time of a whole command.
-
-    Parameters
-    ----------
-    sides, bounds : ndarray, shape (B, 3) and (B,)
-        `sides @ z <= bounds`, of which there must be a solution.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        The solution z.
+    `sides @ z <= bounds` with B sides, shape (B, 3), of which there must be a solution. A cage has up to twenty bounds.
+    All threes of them are looked at, in a fifth of the time of a general solver, whose import alone takes a tenth of
+    the time of a whole command.
     """
     n = np.arange(len(bounds))
     threes = np.array(np.nonzero((n[:, None, None] < n[:, None]) & (n[:, None] < n)))

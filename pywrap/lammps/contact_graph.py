@@ -15,25 +15,10 @@ from ...analysis.factors.linear_solver import Band, Booleans, band
 
 
 class ContactGraph:
-    """The contacts of a packing without their slips.
+    """The contacts of a packing without their slips: partners `i` and `j` (C,), with j = -1 of the floor.
 
-    Parameters
-    ----------
-    contacts : Contacts
-        Of the packing; their slips do not matter.
-    radius : ndarray, shape (N,)
-        Of the disks, length.
-
-    Attributes
-    ----------
-    i, j : ndarray of int, shape (C,)
-        Partners; j = -1 is the floor.
-    pairs : int
-        Contacts of two disks; those with the floor follow.
-    reach : ndarray, shape (C,)
-        R_i + R_j of each contact, R_i for the floor; length.
-    has_contact : ndarray of bool, shape (N,)
-        Disks that have a contact.
+    The `pairs` contacts of two disks come first. `reach` (C,) is R_i + R_j, or R_i with the floor; `has_contact` (N,)
+    says which disks have a contact.
     """
 
     def __init__(self, contacts: Contacts, radius: Floats) -> None:

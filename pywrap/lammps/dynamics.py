@@ -17,21 +17,8 @@ from .lammps_state import PERIODS_AWAY, LammpsState
 
 
 class MotionState(NamedTuple):
-    """Positions and velocities in the course of an undamped run.
-
-    Attributes
-    ----------
-    position : ndarray, shape (N, 2)
-        Centres, length.
-    position_low : ndarray, shape (N, 2), or None
-        Their low parts, in compensated arithmetic.
-    velocity : ndarray, shape (N, 2)
-        Length / time.
-    spin : ndarray, shape (N,)
-        Angular velocity, 1 / time.
-    friction : float
-        Friction coefficient at that moment.
-    """
+    """Positions and velocities in the course of an undamped run: `position` (N, 2) with its low part in compensated
+    arithmetic, `velocity` (N, 2), angular velocity `spin` (N,), and the friction coefficient at that moment."""
 
     position: Floats
     position_low: Floats | None

@@ -38,17 +38,9 @@ MOST_STEPS_OF_DYNAMICS = 10_000_000
 
 @dataclass(frozen=True)
 class Relaxation:
-    """How a relaxation ended.
-
-    Attributes
-    ----------
-    residual : float
-        Largest force, with torque over radius, on a disk.
-    status : {"yes", "floor", "no"}
-        Whether the tolerance was reached, or the rounding of the coordinates, or neither.
-    steps : int
-        Time steps, that is force evaluations.
-    """
+    """How a relaxation ended: the largest force, with torque over radius, on a disk, whether the tolerance was reached
+    ("yes"), or the rounding of the coordinates ("floor"), or neither ("no"), and the time steps, that is force
+    evaluations."""
 
     residual: float
     status: str
@@ -260,12 +252,8 @@ class Engine(LammpsState):
         if mobile := "mobile" * ("still" in groups):
             self.command("group mobile subtract all still")
             undo.append("group mobile delete")
-        self.include(
-            "undamped.in",
-            mobile=mobile or "all",
-            dt=time_step,
-            tau=packing.drag_time if drag_time is None else drag_time,
-        )
+        drag_time = packing.drag_time if drag_time is None else drag_time
+        self.include("undamped.in", mobile=mobile or "all", dt=time_step, tau=drag_time)
         if packing.law.damped:
             law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
             # `explain` takes the floor away

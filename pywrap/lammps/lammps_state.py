@@ -41,21 +41,10 @@ FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
 
 
 class LammpsState(Decks):
-    """The disks of a LAMMPS instance; collective.
+    """The disks of a LAMMPS instance; collective. Radii, law and box of the packing that LAMMPS holds stay.
 
-    Parameters
-    ----------
-    lammps : lammps.lammps
-        The instance.
-    packing : Packing
-        What LAMMPS holds: its radii, law and box stay.
-
-    Attributes
-    ----------
-    fx : float
-        Force along x on each disk of the upper layer.
-    evaluations : int
-        Forces computed for displacements and relaxations so far.
+    `fx` is the force along x on each disk of the upper layer, and `evaluations` counts forces computed for
+    displacements and relaxations so far.
     """
 
     def __init__(self, lammps: Any, packing: Packing) -> None:
@@ -100,22 +89,11 @@ class LammpsState(Decks):
             self.command("variable load delete")
 
     def displace(self, base: Packing, displacement: Floats) -> Packing:
-        """Move the disks from a configuration along a straight path and advance the slips along it.
+        """Move the disks from a configuration along a straight path, and advance the slips along it.
 
-        The result does not depend on the configuration before the call: any number of trials may start from one base,
-        and each is bitwise independent of the others.
-
-        Parameters
-        ----------
-        base : Packing
-            Where the path begins.
-        displacement : ndarray, shape (3N,)
-            (dx.., dy.., R dtheta..), length.
-
-        Returns
-        -------
-        Packing
-            The configuration at the end of the path; `net_force` has its forces.
+        The displacement is (dx.., dy.., R dtheta..), shape (3N,). Returns the configuration at the end; `net_force` has
+        its forces. It does not depend on the configuration before the call: any number of trials may start from one
+        base, and each is bitwise independent of the others.
         """
         return self.try_displacement(base, displacement).packing
 

@@ -24,30 +24,10 @@ EPSILON = float(np.finfo(float).eps)
 class Trial:
     """A configuration and the forces on it.
 
-    Attributes
-    ----------
-    still : Packing
-        What a displacement leaves as it is: radii, masses, box, law, and the load but for
-    fx : float
-        Force along x on each disk of the upper layer.
-    position : ndarray, shape (N, 2)
-        Centres, length.
-    position_low : ndarray, shape (N, 2), or None
-        Their low parts, in compensated arithmetic.
-    angle : ndarray, shape (N,)
-        Orientations, radian.
-    graph : ContactGraph
-        Who touches whom.
-    slip : ndarray, shape (C,)
-        Length.
-    slip_low : ndarray, shape (C,), or None
-        Their low parts, in compensated arithmetic.
-    force : ndarray, shape (3N,)
-        (Fx.., Fy.., T/R..), load included.
-    displacement : ndarray, shape (3N,), or None
-        The one that ends here, (dx.., dy.., R dtheta..).
-    known : Packing or None
-        The configuration, if the trial was made of one.
+    `still` is a packing with what a displacement leaves as it is: radii, masses, box, law, and the load but for `fx`.
+    `position` (N, 2), `angle` (N,), `graph` and `slip` (C,) are the state; low parts are those of compensated
+    arithmetic. `force` (3N,) is (Fx.., Fy.., T/R..), load included, and `displacement` (3N,) the one that ends here,
+    (dx.., dy.., R dtheta..). `known` is the configuration, if the trial was made of one.
     """
 
     still: Packing

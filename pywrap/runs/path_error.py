@@ -95,21 +95,10 @@ def with_path_error(
 ) -> Onset:
     """An onset with the error of its path: extrapolated where that can be done, bounded where not.
 
-    Parameters
-    ----------
-    onset : Onset
-        As found on the path; the errors of its windows are those of rounding.
-    path : LoadPath
-        The ramp, at least up to the last window.
-    with_dashpots : callable, optional
-        A packing of the path -> the same with the dissipation with which the onset was found.
-
-    Returns
-    -------
-    Onset
-        Windows with the onset of the exact path and the whole error, of the onset without dissipation, too. A window
-        keeps its own, and a `path_error` of None, where the ramp has no equilibrium at the onset that the search has
-        found there.
+    The path is the ramp, at least up to the last window, and the onset has errors of rounding alone. `with_dashpots`
+    gives a packing of the path the dissipation with which the onset was found. Windows then have the onset of the exact
+    path and the whole error; so has the onset without dissipation. A window keeps its own, and a `path_error` of None,
+    where the ramp has no equilibrium at the onset that the search has found there.
     """
     known: Known = {}
 
@@ -132,28 +121,13 @@ def with_path_error(
 def path_error(
     path: LoadPath[Equilibrium], fx: float, vanishes: Vanishes, rounding: float, known: Known | None = None
 ) -> tuple[float, float]:
-    """The effect of the increments on one onset of a ramp: its correction and its uncertainty, force.
+    """The effect of the increments on the onset fx of a ramp: its correction and its uncertainty, force.
 
     The correction is 0 where it is no more than rounding, or contacts change. The uncertainty is an increment where the
-    onset is not found on another path.
-
-    Parameters
-    ----------
-    path : LoadPath
-        The ramp, at least up to the onset.
-    fx : float
-        The onset as found on the path, force.
-    vanishes : callable
-        Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
-    rounding : float
-        Uncertainty of fx from rounding, force.
-    known : dict, optional
-        Equilibria of the other paths of this ramp by their names: onsets have these in common for the most part.
-
-    Raises
-    ------
-    NoEquilibriumError
-        If the ramp has no equilibrium at fx.
+    onset is not found on another path. `vanishes` takes a packing to what goes through zero at the onset: `squared_gap`
+    or `growth_near`. `rounding` is the uncertainty of fx from rounding. `known` has equilibria of the other paths of
+    this ramp by their names: onsets have these in common for the most part. Raises NoEquilibriumError if the ramp has
+    no equilibrium at fx.
     """
     changed, known = contact_changes(path, fx), {} if known is None else known
     ramp = np.array([*(each.fx for each in path.equilibria if each.fx < fx), fx])

@@ -38,26 +38,9 @@ FORCE_OF_MOTION = 1e-6
 
 
 def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = None) -> Packing:
-    """Carry a packing at rest to another F_y.
+    """Carry a packing that rests at its own F_y, with F_x = 0, to another F_y; the same packing if that is its own.
 
-    Parameters
-    ----------
-    packing : Packing
-        At rest at its own F_y, with F_x = 0.
-    fy : float
-        F_y that is wanted, force.
-    communicator : mpi4py.MPI.Comm, optional
-        The ranks that share the packing; all by default.
-
-    Returns
-    -------
-    Packing
-        At rest at the F_y that is wanted; the same packing if that is its own.
-
-    Raises
-    ------
-    NoEquilibriumError
-        If the packing does not come to rest at some F_y on the way.
+    Raises NoEquilibriumError if the packing does not come to rest at some F_y on the way.
     """
     here = packing
     for load in loads_between(packing.fy, fy):
@@ -76,10 +59,9 @@ def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = Non
                 here, found = minimize_energy(start)
                 here = here if found else settle_loose(engine, start, bed=False)
         if here.residual > FORCE_OF_MOTION * load:
-            raise NoEquilibriumError(
-                f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}, at "
-                f"{load:.6g}: choose packing.settle_at nearer to the load, or another seed"
-            )
+            says = f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}"
+            cure = "choose packing.settle_at nearer to the load, or another seed"
+            raise NoEquilibriumError(f"{says}, at {load:.6g}: {cure}")
     return here
 
 

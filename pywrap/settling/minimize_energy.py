@@ -78,21 +78,11 @@ is the least, within a factor of two in the damping, for 1000, 3000 and 10,000 d
 
 
 def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
-    """A loose start at rest on the floor, under the load on its upper layer.
+    """A loose start, without contacts and F_x, at rest on the floor, under the load on its upper layer.
 
-    Parameters
-    ----------
-    loose : Packing
-        The start: no contacts, at F_x = 0.
-    bed : bool
-        Whether to lay a bed first, by a pull on every disk. Without, the load begins at once: for disks without
-        friction that lie on each other already.
-
-    Returns
-    -------
-    Packing
-        At rest to the rounding floor; where that is not found, to the last of the tolerances; or as it was when the
-        steps ran out.
+    With `bed` a pull on every disk lays a bed first. Without, the load begins at once: for disks without friction that
+    lie on each other already. The packing rests to the rounding floor; where that is not found, to the last of the
+    tolerances; or is as it was when the steps ran out.
     """
     start, width, stiffest = None if bed else loose, _width(loose), _stiffest(loose)
     if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
@@ -127,22 +117,9 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
 
 
 def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) -> tuple[Packing, bool]:
-    """The packing at the minimum of the energy downhill from a packing, by Newton's method with implicit steps.
-
-    Parameters
-    ----------
-    packing : Packing
-        Without friction, near a minimum.
-    iterations : int
-        Linear solves, at the most.
-
-    Returns
-    -------
-    Packing
-        The minimum; or, where it is not reached, as far downhill as the iteration came.
-    bool
-        Whether the force is down at the rounding floor.
-    """
+    """The packing at the minimum of the energy downhill from a packing without friction near it, by Newton's method
+    with implicit steps; and whether the force is down at the rounding floor, else the packing is as far as the
+    iteration came."""
     here, best, least, stiffest = packing, packing, largest_force(packing), _stiffest(packing)
     sigma = max(stiffest * min(1.0, least / packing.fy) * 1e-2, 1e-12 * stiffest)
     for _ in range(iterations):

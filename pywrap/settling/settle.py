@@ -111,10 +111,8 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
     if not isinstance(section, GeneratedPacking):
         packing = _in_arithmetic(section.packing(law, **load_of(scene)), scene.precision)
         if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
-            raise SceneError(
-                f"{section.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
-                f"fy = {scene.load.fy:g}: {CHECK_LOAD}"
-            )
+            feels = f"a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}"
+            raise SceneError(f"{section.file}: the packing is not in balance, {feels}: {CHECK_LOAD}")
         return packing
     kn, fy, at = law.kn, scene.load.fy, section.settle_at
     if at is not None:
@@ -133,11 +131,10 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
         if len(idle) <= 0.5 * len(packing):
             break
     else:
-        raise NoEquilibriumError(
-            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {len(idle)} of "
-            f"{len(packing)} disks carry nothing: without friction only a layer that closes the box stays on top, so "
-            f"{MORE_IN_LAYER}"
-        )
+        sank = f"the upper layer sank through the bed from each of {STARTS} loose starts"
+        why = "without friction only a layer that closes the box stays on top"
+        sank += f", and {len(idle)} of {len(packing)} disks carry nothing"
+        raise NoEquilibriumError(f"{sank}: {why}, so {MORE_IN_LAYER}")
     if not own.settle_friction:
         packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
     wanted = own_units(section, law, scene.load.fy)[2]
@@ -185,20 +182,7 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     the scene has: radii, width and F_y are rounded to `DIGITS` when they are converted, so that two scenes that differ
     in their units alone settle the same numbers. A scene that has these units already settles its numbers as they are.
     Numbers of more than `DIGITS` digits, such as a width of sqrt(2), therefore settle otherwise in other units.
-
-    Parameters
-    ----------
-    packing : GeneratedPacking
-        Radii and width in the scene's length.
-    law : MindlinLaw
-        In the scene's force / length^exponent.
-    fy : float
-        The scene's force.
-
-    Returns
-    -------
-    GeneratedPacking, MindlinLaw, float
-        The same in the packing's units. Dashpots are left out: settling has a damping of its own.
+    Dashpots are left out: settling has a damping of its own.
     """
     length, stiffness = 2 * min(packing.radii), SETTLING_STIFFNESS.get(law.exponent, SETTLING_STIFFNESS[1.5])
     undamped = replace(law, cn=0.0, ct=0.0)

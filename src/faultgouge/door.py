@@ -374,7 +374,7 @@ def view(
     '<!doctype html>'
     """
     from .analysis.responses.hysteresis import turning_points
-    from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
+    from .figures.browser_page import Axis, loads_shown, write_view
     from .figures.followed_pairs import seconds
     from .figures.packing import in_words
 
@@ -387,7 +387,7 @@ def view(
         with RunFile(path) as run:
             driven = "time" in run.observables
             turns = [] if driven else turning_points(run.fx)
-            chosen = sorted({*equally_spaced(len(run), loads_shown(len(last)) if loads is None else loads), *turns})
+            chosen = sorted({*loads_shown(len(run), len(last), loads), *turns})
             packings = [packing_in(run, k) for k in chosen]
             series = run.series("undamped") if "undamped" in run.names_of_series else None
             span = " to ".join(f"{run.fx[k]:g}" for k in sorted({0, *turns, len(run) - 1}))

@@ -17,8 +17,7 @@ FOLDER = Path(__file__).with_name("studies")
 
 class Description(NamedTuple):
     """What the text of a file says of its study: the decorator, "study" of one scene or "task" of each scene of a
-    sweep, with its keywords (None for what is no constant), and the docstring, which is the help of the command.
-    """
+    sweep, with its keywords (None for what is no constant), and the docstring, which is the help of the command."""
 
     kind: str
     given: dict[str, Any]

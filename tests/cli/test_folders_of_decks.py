@@ -33,15 +33,14 @@ PARTS = {
 }
 """What stands for these lines in decks_of_users.txt: @END ends a file in the middle of a line."""
 
-
-DECKS: dict[str, dict[str, str]] = {}
+TEXT = (Path(__file__).parent / "decks_of_users.txt").read_text()
+for part, fill in PARTS.items():
+    TEXT = TEXT.replace(part, fill)
+DECKS = {
+    deck: dict(each.split("\n", 1) for each in f"deck.in\n{text}".split("---- "))
+    for deck, text in (whole.split("\n", 1) for whole in TEXT.split("==== ")[1:])
+}
 """Files by the names of decks."""
-
-for whole in (Path(__file__).parent / "decks_of_users.txt").read_text().split("==== ")[1:]:
-    deck, _, text = whole.partition("\n")
-    for part, fill in PARTS.items():
-        text = text.replace(part, fill)
-    DECKS[deck] = dict(each.split("\n", 1) for each in f"deck.in\n{text}".split("---- "))
 
 TIMES = re.compile(
     rb"^(Printed on |Loop time of|Performance:|[\d.]+% CPU use|Total wall time|.* CPU = "
@@ -61,8 +60,7 @@ for deck in sys.argv[1:]:  # each in a process where no LAMMPS was before
     if child == 0:
         MPI.Init()
         try:
-            found = run_deck(Path(deck), balance=math.inf)
-            says = found.position.tolist()
+            says = run_deck(Path(deck), balance=math.inf).position.tolist()
         except FaultgougeError as error:
             says = str(error)
         print(json.dumps([deck, says]), flush=True)
@@ -74,7 +72,7 @@ for deck in sys.argv[1:]:  # each in a process where no LAMMPS was before
 def _files(folder):
     """All files of a folder; logs without times."""
     found = {}
-    for path in sorted(each for each in folder.rglob("*") if each.is_file()):
+    for path in (each for each in folder.rglob("*") if each.is_file()):
         fill = path.read_bytes()
         if path.suffix in (".log", ".lammps") or path.name == "info.txt":
             fill = [line for line in fill.splitlines() if not TIMES.match(line)]
@@ -88,26 +86,24 @@ def folders(tmp_path_factory, lmp_of_the_environment):
     base, (program, environment) = tmp_path_factory.mktemp("decks"), lmp_of_the_environment
     places = {name: base / name.replace(" ", "_") for name in DECKS}
     for name, files in DECKS.items():
-        for path, fill in (
-            (places[name] / who / file, fill) for who in ("lmp", "here") for file, fill in files.items()
-        ):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(fill)
+        for file, fill in files.items():
+            for path in (places[name] / who / file for who in ("lmp", "here")):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(fill)
         told = {"cwd": places[name] / "lmp", "env": environment, "capture_output": True, "check": False, "timeout": 60}
         subprocess.run([program, "-in", "deck.in"], **told)
-    decks = {name: str(place / "here" / "deck.in") for name, place in places.items()}
+    decks = {str(place / "here" / "deck.in"): name for name, place in places.items()}
     fresh = {key: value for key, value in os.environ.items() if key != "LAMMPS_PLUGIN_PATH"}  # as in a user's shell
-    command = [sys.executable, "-c", RUN_THEM, *decks.values()]
+    command = [sys.executable, "-c", RUN_THEM, *decks]
     done = subprocess.run(command, env=fresh, capture_output=True, text=True, check=True, timeout=300)
-    found = dict(json.loads(line) for line in done.stdout.splitlines() if line.startswith('["'))
-    return {name: (place / "lmp", place / "here", found.get(decks[name])) for name, place in places.items()}
+    found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith('["')]
+    return {decks[deck]: (places[decks[deck]] / "lmp", places[decks[deck]] / "here", says) for deck, says in found}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", DECKS)
 def test_folder_and_last_state(folders, name):
     theirs, ours, state = folders[name]
-    assert state is not None
     expected, found = _files(theirs), _files(ours)
     assert found.keys() == expected.keys()
     for file, fill in expected.items():

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,23 +16,12 @@ from faultgouge.pywrap.lammps.instance import lammps_instance
 
 @pytest.fixture
 def taken(faultgouge_here, tmp_path):
-    """Imports a deck; what the command says, and the configuration that it has stored."""
+    """Imports a deck; what the command says, and the configuration that it has stored, none if it is refused."""
 
-    def take(text: str, *words: str, name: str = "pile"):
+    def take(text: str, *words: str, name: str = "pile", code: int = 0):
         (tmp_path / f"{name}.in").write_text(text)
-        said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", *words).stdout
-        return said, read_configuration(tmp_path / f"{name}.h5")
-
-    return take
-
-
-@pytest.fixture
-def not_taken(faultgouge_here, tmp_path):
-    """Imports a deck that is refused; the error."""
-
-    def take(text: str, *words: str, name: str = "pile", code: int = 1):
-        (tmp_path / f"{name}.in").write_text(text)
-        return faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", *words, code=code).stderr
+        done = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", *words, code=code)
+        return (done.stderr, None) if code else (done.stdout, read_configuration(tmp_path / f"{name}.h5"))
 
     return take
 
@@ -43,12 +33,8 @@ SPRINGS = "hertz/history ${kn} NULL 10 NULL 0.9 1"
 
 def of_granular(law: str) -> str:
     """The pile of spheres with a law of `granular`."""
-    deck = (
-        PILE[""]
-        .replace(f"pair_style gran/{SPRINGS}", "pair_style granular")
-        .replace(f"gran {SPRINGS}", f"gran granular {law}")
-    )
-    return deck.replace("pair_coeff * *", f"pair_coeff * * {law}")
+    deck = PILE[""].replace(f"pair_style gran/{SPRINGS}", "pair_style granular")
+    return deck.replace(f"gran {SPRINGS}", f"gran granular {law}").replace("* *", f"* * {law}")
 
 
 @pytest.mark.parametrize("shape", [FLAT, ROUND], ids=["disks", "spheres"])
@@ -56,38 +42,34 @@ def test_deck(faultgouge_here, taken, tmp_path, shape):
     from faultgouge.analysis import eigenvalues
 
     (tmp_path / "own").mkdir()
+    pile = "own/pile.h5"
     said, configuration = taken(DECK.format(**shape, word="contacts"), name="own/pile")
-    (tmp_path / "own" / "pile.h5").rename(tmp_path / "pile.h5")
     assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in said
     assert configuration.residual < 1e-6
-    found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)["eigenvalues"]
+    found = json.loads(faultgouge_here("spectrum", pile, "--json").stdout)["eigenvalues"]
     assert [complex(*each) for each in found] == pytest.approx(list(eigenvalues(configuration)), abs=1e-8)
-    assert "as LAMMPS left them" in faultgouge_here("spectrum", "pile.h5").stdout
+    assert "as LAMMPS left them" in faultgouge_here("spectrum", pile).stdout
 
-    faultgouge_here("export", "pile.h5", "--mode", "1", "-o", "pile.vtp")
+    faultgouge_here("export", pile, "--mode", "1", "-o", "pile.vtp")
     piece = ElementTree.parse(tmp_path / "pile.vtp").find(".//Piece")
     assert (piece.get("NumberOfVerts"), piece.get("NumberOfLines")) == ("3", str(len(configuration.contacts)))
     names = {each.get("Name"): each.get("NumberOfComponents") for each in piece.find("PointData")}
     assert names["mode_1"] == names["mode_1_rotation"] == names["net_force"] == "3"
-    faultgouge_here("export", "pile.h5", "-o", "pile.xyz")
-    rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:], usecols=range(1, 4))
-    assert np.array_equal(rows[:, : configuration.dimension], configuration.position)
-    faultgouge_here("export", "pile.h5", "-o", "pile.data")
+    faultgouge_here("export", pile, "-o", "pile.data")
     lammps = lammps_instance(MPI.COMM_SELF, None)
     lammps.commands_list(["atom_style sphere", f"read_data {tmp_path}/pile.data"])
     order, place, mass = (np.array(lammps.numpy.extract_atom(name)[:3]) for name in ("id", "x", "rmass"))
     lammps.close()
     assert np.array_equal(place[np.argsort(order), : configuration.dimension], configuration.position)
     np.testing.assert_allclose(mass.ravel()[np.argsort(order)], configuration.mass, rtol=1e-15)
-    assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
-    refusals = [("spectrum", "--rise", "has no upper layer"), ("movie", "no run of ours")]
+    assert "3 contacts (3 with walls)" in faultgouge_here("draw", pile, "-o", "pile.png").stdout
+    refusals = ["spectrum --rise | has no upper layer", "movie | no run of ours"]
     if shape is ROUND:
-        refusals.append(("movie", "--mode", "0", "a film shows disks"))
-        refusals.append(("export", "--mode", "99", "-o", "pile.vtp", "15 modes, counted from 0"))
+        refusals += ["movie --mode 0 | a film shows", "export --mode 99 -o pile.vtp | 15 modes, counted from 0"]
     else:
-        assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
-    for command, *words, says in refusals:
-        assert says in faultgouge_here(command, "pile.h5", *words, code=2).stderr
+        assert "mode 1 of 9" in faultgouge_here("draw", pile, "--mode", "1", "-o", "mode.png").stdout
+    for command, says in (each.split(" | ") for each in refusals):
+        assert says in faultgouge_here(*command.split(), pile, code=2).stderr
 
 
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
@@ -109,44 +91,16 @@ def test_walls_that_hand_out_no_contacts(taken, walls):
         assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-12 * one.normal_stiffness.max())
 
 
-POUR = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -2 2 -2 2 -1 9 units box
-create_box 1 box
-neigh_modify delay 0
-pair_style granular
-pair_coeff * * {law}
-variable rise equal {rise}
-region floor plane 0 0 0 0 0 1 side in move NULL NULL v_rise units box
-region tube cylinder z 0 0 1.3 -1 9 side in units box
-region bin intersect 2 floor tube
-fix bin all wall/gran/region granular {law} region bin
-fix load all gravity 1.0 vector 0 0 -1
-fix move all nve/sphere
-region slab cylinder z 0 0 1.2 4 8 units box
-fix ins all pour 5 1 4711 region slab diam range 0.8 1.0 dens 1.0 1.0
-timestep 0.002
-thermo 100000
-thermo_modify lost warn
-run {steps}
-"""
-
-
-LAW = "hertz 2e3 10 tangential mindlin 1.5e3 1 0.5 rolling sds 100 {g} 0.2"
-
-
 def pour(g=1, rise: object = 0.0) -> str:
-    return POUR.format(law=LAW.format(g=g), rise=rise, steps=6000)
+    """Five spheres that fall into a bin, whose floor may rise."""
+    law = f"hertz 2e3 10 tangential mindlin 1.5e3 1 0.5 rolling sds 100 {g} 0.2"
+    return (Path(__file__).parent / "pour.in").read_text().format(law=law, rise=rise)
 
 
-def test_what_has_been_poured_comes_to_rest(taken, not_taken):
+def test_what_has_been_poured_comes_to_rest(taken):
     """A deck that ends while its particles move, with fix pour, which lets no time step be changed; and with a region
     that may move, but stays."""
-    said = not_taken(pour())
+    said, _ = taken(pour(), code=1)
     assert "The packing moves: the residual of particle" in said
     assert "bring it to rest by faultgouge.relax(lmp), in a command --relax, or" in said
     _, found = taken(pour(), "--relax")
@@ -155,19 +109,12 @@ def test_what_has_been_poured_comes_to_rest(taken, not_taken):
     assert found.proof < 1e-5
 
 
-def test_a_run_that_fix_halt_has_ended(taken, not_taken):
+def test_a_run_that_fix_halt_has_ended(taken):
     """LAMMPS skips all further runs; the particles come to rest all the same."""
     halted = "variable now equal step\nfix stop all halt 10 v_now > 1500 error soft message no\nrun 6000"
     deck = PILE[""].replace("run 6000", halted)
-    assert "The packing moves" in not_taken(deck)
+    assert "The packing moves" in taken(deck, code=1)[0]
     assert taken(deck, "--relax")[1].residual < 1e-8
-
-
-def test_a_deck_without_particles(not_taken, tmp_path):
-    """There is no state to keep."""
-    said = not_taken(re.sub("(?m)^(create_atoms|set) .*\n", "", PILE[""]))
-    assert "This LAMMPS has no particles. No state is kept, as there are no particles.\n" in said
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["log.lammps", "pile.in"]
 
 
 @pytest.mark.long
@@ -182,30 +129,23 @@ def test_a_deck_on_two_ranks(faultgouge, taken, tmp_path):
     assert "one step after the end of the deck on 2 ranks" in two.remarks[-1]
 
 
-def test_regions_that_move(not_taken):
-    """A part of an intersection that rises with the time: its place is another one in each run."""
-    for more in ((), ("--relax",)):
-        said = not_taken(pour(rise="1e-6*elapsed"), *more)
-        assert "LAMMPS's forces change with the time, though nothing moves: a load, a wall or a region follows" in said
-
-
-def test_a_line_at_which_lammps_stops(faultgouge_here, not_taken, tmp_path):
+def test_a_line_at_which_lammps_stops(faultgouge_here, taken, tmp_path):
     """The state of the runs before it is kept."""
     deck = PILE["contacts"].replace("run 6000", "run 1500\ncompute what all no/such/style")
-    said = not_taken(deck, name="stops")
+    said, _ = taken(deck, name="stops", code=1)
     assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
     assert "is kept in stops.restart, and the deck stops.restart.in beside it goes on from there" in said
     assert "3 spheres, " in faultgouge_here("import", "stops.restart", "--relax", "-o", "stops.h5").stdout
-    said = not_taken(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"), name="lost")
+    said, _ = taken(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"), name="lost", code=1)
     assert "Lost atoms: original 3 current 0" in said
     assert "The state is not kept: LAMMPS stopped: Lost atoms" in said
     assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 
 @pytest.mark.long
-def test_time_step_with_which_nothing_rests(not_taken):
+def test_time_step_with_which_nothing_rests(taken):
     """Rolling dashpots stronger than the time step allows: spheres vibrate for ever, as their friction bounds it."""
-    said = not_taken(pour(g=500).replace("pour 5", "pour 8"), "--relax")
+    said, _ = taken(pour(g=500).replace("pour 5", "pour 8"), "--relax", code=1)
     found = re.search(r"its time step 0.002 is longer than the largest stable one, (\S+), of its contacts", said)
     assert 1e-5 < float(found[1]) < 0.002
 
@@ -273,12 +213,9 @@ def test_bare_files_of_lammps(refusal, taken):
 
 def test_packing_in_which_nothing_touches(faultgouge_here, taken):
     far = DISKS.replace("0.5 0 units", "0.7 0 units").replace("0.45", "0.8").replace("1.3", "2.5")
-    said, _ = taken(far.replace("run 6000", "run 0"))
-    assert "3 disks, 0 contacts" in said
-    for command, output in (("draw", "far.png"), ("export", "far.vtp")):
-        for mode in ("pair", "0"):
-            says = faultgouge_here(command, "pile.h5", "--mode", mode, "-o", output, code=None).stderr
-            assert "the packing has 0 modes" in says
+    assert "3 disks, 0 contacts" in taken(far.replace("run 6000", "run 0"))[0]
+    for command in ("draw --mode pair -o far.png", "export --mode 0 -o far.vtp"):
+        assert "the packing has 0 modes" in faultgouge_here(*command.split(), "pile.h5", code=None).stderr
     assert "no frame 3" in faultgouge_here("draw", "pile.h5", "--frame", "3", code=2).stderr
 
 
@@ -289,6 +226,7 @@ ROW = re.sub("(?m)^create_atoms .*\n", "", DISKS).replace("create_box 1 box\n", 
 ROW = ROW.replace("boundary f", "boundary p").replace("-2 2", "-1.51 1.51", 1).replace("run 6000", "run 20000")
 LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
 AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
+RISES, FOLLOWS = pour(rise="1e-6*elapsed"), "LAMMPS's forces change with the time, though nothing moves: a load, a wall"
 REFUSED = [
     ("pile.in --kn 3", DISKS, 2, "only -o, --relax and --balance go with it"),
     ("pile.in --balance nan", DISKS, 2, "greater than or equal to 0"),
@@ -299,10 +237,17 @@ REFUSED = [
     ("lig.in", "units si\nhard_particles yes\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", f"{LIGGGHTS}fix m1 all property/global youngsModulus peratomtype 5.e6\n", 1, "of LIGGGHTS, whose"),
     ("cleared.in", f"{DISKS}clear\n", 1, "no pair_style after `clear`, which takes all away"),
-    *(
-        ("mute.in", f"echo {way}\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out")
-        for way in ("none", "log")
+    ("mute.in", f"echo none\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out"),
+    ("mute.in", f"echo log\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out"),
+    (
+        "empty.in",
+        re.sub("(?m)^(create_atoms|set) .*\n", "", PILE[""]),
+        1,
+        "has no particles. No state is kept, as there",
     ),
+    # a part of an intersection: its place is another one in each run
+    ("rises.in", RISES, 1, FOLLOWS),
+    ("rises.in --relax", RISES, 1, FOLLOWS),
     # LAMMPS forgets histories there, since the compute has asked for another list of neighbours
     ("lost.in", f"{ROW}{AFTER}", 1, "write_restart, rerun, reset_atoms, and delete_atoms without `compress no`, lose"),
 ]
@@ -316,6 +261,7 @@ def test_what_is_refused_is_said_with_its_cause(faultgouge_here, tmp_path, words
     assert says in said
     assert "from_lammps" not in said  # a user of the command has no script in Python
     assert not (tmp_path / "packing.h5").exists()
+    assert ("is kept in packing.restart" in said) == (tmp_path / "packing.restart").exists()
 
 
 def test_contacts_at_the_bound(faultgouge_here, taken):

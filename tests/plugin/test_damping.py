@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,25 +119,13 @@ def test_second_order_in_the_time_step(exponent, parts):
     assert 3.7 < coarse / fine < 4.3
 
 
+INPUTS = Path(__file__).with_name("inputs")
 SYSTEM = f"variable decks index {DECKS}\ninclude {DECKS}/system.in\n"
 
 
 @arithmetics
 def test_drag_lets_free_disks_decay(lmp, tmp_path, compensated):
-    script = f"""{SYSTEM}
-displace_atoms all move 0 5 0
-unfix load
-velocity all set 0.3 -0.2 0.0
-set group all omega 0 0 0.5
-pair_style mindlin/smooth 1 0 0 ${{compensated}}
-fix move all nve/disc 1.0 drag 0.25 ${{compensated}}
-fix_modify floor mu 0
-neigh_modify exclude group all all
-timestep 1e-3
-run 100
-write_dump all custom end vx vy omegaz modify format float %.17g
-"""
-    lmp(script, precision="compensated" if compensated else "double")
+    lmp(INPUTS / "drag.in", decks=DECKS, precision="compensated" if compensated else "double")
     rows = next(dump_frames(tmp_path / "end")).rows
     # two hundred rounded factors
     np.testing.assert_allclose(rows, np.exp(-0.4) * np.tile([0.3, -0.2, 0.5], (len(rows), 1)), rtol=2e-14)
@@ -145,21 +134,8 @@ write_dump all custom end vx vy omegaz modify format float %.17g
 @arithmetics
 def test_forces_after_a_run_are_those_of_the_contacts(lmp, tmp_path, compensated):
     """single() and the floor's columns hand out the forces, dashpots included, that the disks have felt."""
-    script = f"""{SYSTEM}
-unfix load
-include {DECKS}/dashpots.in
-velocity all create 1e-2 5 loop geom
-fix move all nve/disc 1.0 ${{compensated}}
-compute seen all pair/local p1 p2 p5 p6 cutoff radius
-compute ids all property/local patom1 patom2 cutoff radius
-dump disks all custom 50 disks fx fy tqz radius f_floor[1] f_floor[2]
-dump_modify disks sort id format float %.17g
-dump pairs all local 50 pairs c_ids[1] c_ids[2] c_seen[1] c_seen[2] c_seen[3] c_seen[4]
-dump_modify pairs format float %.17g
-timestep 1e-3
-run 50
-"""
-    lmp(script, precision="compensated" if compensated else "double", cn=9.0, ct=7.0)
+    given = {"decks": DECKS, "precision": "compensated" if compensated else "double"}
+    lmp(INPUTS / "seen_forces.in", cn=9.0, ct=7.0, **given)
     (*_, disks), (*_, pairs) = (dump_frames(tmp_path / name) for name in ("disks", "pairs"))
     radius, floor_n, floor_t = disks.rows[:, 3:].T
     expected = np.column_stack([-floor_t, floor_n, -radius * floor_t])

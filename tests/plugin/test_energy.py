@@ -1,6 +1,7 @@
 """Energy and virial that LAMMPS reports, and the energy that sliding and dashpots take: keyword energy."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,53 +12,12 @@ from faultgouge.pywrap.lammps.decks import DECKS
 
 KN, KT, MU, FX, FY, WIDTH = 2e5, 2e5 * 2 / 7, 0.5, 2.5, 3.0, 2.8
 
-HEAD = """
-variable        energy index 'energy yes'
-variable        dashpots index '20.0 10.0'
-variable        compensated index ''
-variable        dt index 1e-4
-units           lj
-dimension       2
-boundary        p f p
-atom_style      sphere
-atom_modify     map yes
-comm_modify     vel yes
-"""
-PILE = f"""
-region          box block 0 {WIDTH} -1 4 -0.5 0.5
-create_box      2 box
-create_atoms    1 single 0.5005 0.4996 0
-create_atoms    1 single 2.3 0.4996 0
-create_atoms    2 single 1.4 0.9346 0
-set             group all diameter 1.0
-set             group all mass 1.0
-group           top type 2
-"""
-LAW = f"""
-pair_style      mindlin/smooth {KN} {KT} {MU} damping ${{dashpots}} ${{energy}} ${{compensated}}
-pair_coeff      * *
-fix             floor all wall/mindlin/smooth {KN} {KT} {MU} ylo 0.0 damping ${{dashpots}} ${{energy}} ${{compensated}}
-fix             push top addforce {FX} -{FY} 0.0
-fix             move all nve/disc 1.0 ${{compensated}}
-timestep        ${{dt}}
-"""
+INPUTS = Path(__file__).with_name("inputs")
+HEAD, PILE, LAW, LOOK = ((INPUTS / f"{name}.in").read_text() for name in ("pile_head", "pile", "pile_law", "look"))
 MODEL = HEAD + PILE + LAW
 """Two disks on a floor that touch through the sides of a periodic box, and a third one that slides over them."""
-LOOK = """
-compute         ids all property/local patom1 patom2 cutoff radius
-compute         contact all pair/local p3 p7 p8 cutoff radius
-dump            pairs all local ${every} pairs c_ids[1] c_ids[2] c_contact[1] c_contact[2] c_contact[3]
-dump            disks all custom ${every} disks id id xu yu vx vy omegaz f_floor[3] f_floor[7] f_floor[${column}]
-dump_modify     pairs format float %.17g
-dump_modify     disks format float %.17g sort id
-"""
-AGAIN = f"""
-write_restart   middle.restart
-clear
-{HEAD}
-read_restart    middle.restart
-group           top type 2
-"""
+
+AGAIN = f"write_restart middle.restart\nclear\n{HEAD}read_restart middle.restart\ngroup top type 2\n"
 
 arithmetics = pytest.mark.parametrize("compensated", ["", "compensated"], ids=["double", "compensated"])
 
@@ -67,7 +27,19 @@ def watch_script(lmp, tmp_path):
     """Runs a script, and gives what was seen of pairs and of disks, the tables of a dump, one a step."""
 
     def run(script, every=500, counted=True, compensated="", **settings):
-        lmp(script, every=every, compensated=compensated, column=7 + bool(compensated) + counted, **settings)
+        lmp(
+            script,
+            kn=KN,
+            kt=KT,
+            mu=MU,
+            fx=FX,
+            fy=FY,
+            width=WIDTH,
+            every=every,
+            compensated=compensated,
+            column=7 + bool(compensated) + counted,
+            **settings,
+        )
         return [[frame.rows for frame in dump_frames(tmp_path / name)] for name in ("pairs", "disks")]
 
     return run
@@ -152,23 +124,9 @@ def test_counting_changes_nothing_else_also_where_a_restart_begins_or_ends_it(wa
 @pytest.mark.slow
 def test_energy_is_conserved_without_friction_to_second_order(lmp, tmp_path):
     """Without friction the forces have the energy that LAMMPS reports, floor included."""
-    script = f"""
-include         {DECKS}/system.in
-fix             move all nve/disc 1.0
-timestep        ${{dt}}
-unfix           load
-velocity        top set 0.02 0.0 0.0
-compute         ke all ke
-variable        total equal pe+c_ke+f_floor
-fix_modify      floor energy no
-thermo_style    custom step pe
-thermo_modify   norm no
-fix             series all ave/time 50 1 50 v_total c_ke file series format " %.17g"
-run             $(0.4/dt)
-"""
     drift = []
     for dt in (4e-4, 2e-4):
-        lmp(script, decks=DECKS, mu=0.0, dt=dt)
+        lmp(INPUTS / "drift.in", decks=DECKS, mu=0.0, dt=dt)
         _, total, kinetic = np.loadtxt(tmp_path / "series").T
         assert kinetic.max() > 10 * kinetic[0]  # the layer bursts apart: contact energy becomes kinetic
         drift.append(np.abs(total - total[0]).max())
@@ -176,19 +134,7 @@ run             $(0.4/dt)
 
 
 def test_virial_is_that_of_the_contacts(lmp, tmp_path):
-    script = f"""
-include         {DECKS}/system.in
-fix             move all nve/disc 1.0
-timestep        1e-3
-compute         bare all pressure NULL pair
-thermo_style    custom step c_bare[1] c_bare[2] c_bare[4] vol
-run             200
-print           "$(c_bare[1]:%.17g) $(c_bare[2]:%.17g) $(c_bare[4]:%.17g) $(vol:%.17g)" file virial
-unfix           move
-variable        name index state
-include         {DECKS}/write.in
-"""
-    lmp(script, decks=DECKS, fx=0.3)
+    lmp(INPUTS / "virial.in", decks=DECKS, fx=0.3)
     *pressure, volume = np.loadtxt(tmp_path / "virial")
     packing = read_dump(tmp_path / "state.disks")
     g, pair = packing.geometry, ~packing.contacts.floor

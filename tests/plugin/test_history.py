@@ -1,5 +1,7 @@
 """Rescaled slips, and Coulomb's slider: LAMMPS against the law, against LAMMPS's own style, and growth."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -60,27 +62,7 @@ def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2.0, 2.0], abs=0.05)
 
 
-SCRIPT = """
-units           lj
-dimension       2
-boundary        f f p
-atom_style      sphere
-atom_modify     map yes
-comm_modify     vel yes
-region          box block -5 5 -5 5 -0.5 0.5
-create_box      1 box
-create_atoms    1 single 0.0 0.0 0.0
-create_atoms    1 single 0.0 0.999 0.0
-set             group all diameter 1.0
-neigh_modify    delay 0 every 1
-{style}
-timestep        {dt}
-group           upper id 2
-compute         each all property/atom fx
-compute         force upper reduce sum c_each
-thermo_style    custom step c_force
-thermo          0
-"""
+SCRIPT = Path(__file__).with_name("inputs").joinpath("two_disks.in").read_text()
 LEG = """
 set             group all omega 0.0 0.0 {spin}
 fix             move upper move linear 0.0 {speed} 0.0

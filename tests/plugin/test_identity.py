@@ -1,17 +1,12 @@
 """One trajectory, to the bit: over ranks, newton, sorting, restarts and whatever looks on, with dashpots or without."""
 
+from pathlib import Path
+
 import pytest
 
 from faultgouge.pywrap.lammps.decks import DECKS
 
-START = """
-newton          ${newton}
-include         ${decks}/system.in
-atom_modify     sort ${sort} 0.0
-timestep        2e-3
-if "${cn} > 0" then "include ${decks}/dashpots.in"
-fix             move all nve/disc 1.0 ${drag} ${compensated}
-"""
+START = Path(__file__).with_name("inputs").joinpath("start.in").read_text()
 # a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
 # neighbour lists are built thirty times
 RUN = """

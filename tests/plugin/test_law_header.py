@@ -13,51 +13,7 @@ from faultgouge.analysis import MindlinLaw
 
 HEADERS = Path(__file__).parents[2] / "pair_mindlin_smooth"
 
-SQUARE = """
-  static constexpr double EXPONENT = 2.0;
-  static double growth(double overlap) { return overlap; }
-  static double force(double kn, double overlap) { return kn * overlap * overlap; }
-  static Compensated force(double kn, Compensated overlap) { return kn * (overlap * overlap); }
-  static double lost(double share) { return share; }
-"""
-
-PROGRAM = """
-#include "mindlin_law.h"
-#include <cstdio>
-
-using namespace faultgouge;
-
-struct Square {%s};
-
-// what the plugin asks of each power of its list, beside what the path below does
-const double ASKED = PowerList<Square>::at(0, [](auto p) { return p.EXPONENT + p.growth(1.0); });
-
-// legs of a path: overlap and increment of the slip, in small steps; prints slip, force and work at their ends
-int main()
-{
-  using P = Square;
-  MindlinLaw law;
-  law.kn = 2e6, law.kt = 6e5, law.mu = 0.8, law.history = History::COULOMB;
-  double overlap = 1e-3, slip = 0.0, work = 0.0, to, increment;
-  const int STEPS = 20000;
-  while (std::scanf("%%lf %%lf", &to, &increment) == 2) {
-    const double change = (to - overlap) / STEPS, step = increment / STEPS;
-    for (int k = 0; k < STEPS; k++) {
-      double limit = law.slip_limit_ratio<double>() * overlap;
-      const double before = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-      overlap += change;
-      limit = law.slip_limit_ratio<double>() * overlap;
-      slip = advanced_slip(slip, rescaled_increment<P>(slip, step, change, overlap), limit);
-      const double after = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-      work -= 0.5 * (before + after) * step;
-    }
-    const double limit = law.slip_limit_ratio<double>() * overlap;
-    const double force = law.tangential_force(law.normal_force<P>(overlap), slip, limit);
-    std::printf("%%.17g %%.17g %%.17g\\n", slip, force, work);
-  }
-}
-"""
-
+INPUTS = Path(__file__).with_name("inputs")
 
 CLOSED = [(1e-3, 1.6e-3), (2e-3, 0.0), (2e-3, -1.6e-3), (1e-3, 0.0)]
 """Slipped, pressed, slipped back, and parted: (overlap, increment) of each leg."""
@@ -66,8 +22,7 @@ CLOSED = [(1e-3, 1.6e-3), (2e-3, 0.0), (2e-3, -1.6e-3), (1e-3, 0.0)]
 @pytest.mark.slow
 def test_another_exponent(tmp_path, monkeypatch):
     """The square, as the header has it: the slips and forces of the Python law, and no energy out of a closed path."""
-    (tmp_path / "path.cpp").write_text(PROGRAM % SQUARE)
-    compiler = ["c++", "-std=c++17", "-O1", f"-I{HEADERS}", "path.cpp", "-o", "path"]
+    compiler = ["c++", "-std=c++17", "-O1", f"-I{HEADERS}", INPUTS / "law_path.cpp", "-o", "path"]
     done = subprocess.run(compiler, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     monkeypatch.setattr("faultgouge.analysis.packing.law.EXPONENTS", (2.0,))

@@ -2,6 +2,7 @@
 
 import re
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from mpi4py import MPI
@@ -9,23 +10,7 @@ from table_rows import rows_of
 
 from faultgouge.pywrap.lammps.instance import lammps_instance
 
-MODEL = """
-units lj
-dimension {dimension}
-boundary p f p
-atom_style sphere
-{vel}
-region box block 0 {width} -1 10 -0.5 0.5
-create_box 1 box
-create_atoms 1 single 1 0.499 0
-create_atoms 1 single 2 0.499 0
-set group all diameter 1.002
-set group all mass 1.0
-{pair}
-{coeff}
-{fix}
-{run}
-"""
+MODEL = Path(__file__).with_name("inputs").joinpath("refused.in").read_text()
 NVE = "fix 1 all nve/disc 1.0 "
 GOOD = {"pair": "pair_style mindlin/smooth 2e5 5e4 1.0", "coeff": "pair_coeff * *", "fix": NVE, "run": "run 10"}
 GOOD |= {"dimension": 2, "vel": "comm_modify vel yes", "width": 8}

@@ -2,6 +2,7 @@
 
 import re
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,19 +14,7 @@ from faultgouge.pywrap.lammps.instance import lammps_instance
 
 FRICTIONLESS = "variable mu index 0.0\n"
 MODEL = f"variable decks index {DECKS}\ninclude {DECKS}/system.in\ntimestep 1e-3\n"
-ALONE = """
-units lj
-dimension 2
-boundary p p p
-atom_style sphere
-region box block 0 4 0 4 -0.1 0.1
-create_box 1 box
-create_atoms 1 single 1 1 0
-set group all diameter 1.0 mass 1.0
-pair_style zero 1.0 nocoeff
-pair_coeff * *
-run_style respa 2 2
-"""
+ALONE = Path(__file__).with_name("inputs").joinpath("one_disk.in").read_text()
 # a growing radius needs ghosts whose radii are sent in every step
 GROWING = MODEL.replace("system.in", "growing.in")
 DUMP = "fix still all displace/disc\nrun 0\nwrite_dump all custom seen.dump id x y\nunfix still\n"

@@ -53,11 +53,9 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
     else:
         columns = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
         columns |= dict(zip("xyz", particles.position.T, strict=True))
-        turn = np.asarray(particles.orientation, dtype=np.float64)
-        columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
         x, y, z, xy, xz, yz = (float(each) for each in shown.configuration.box)
         box = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
-        more = {"origin": -0.5 * box.sum(axis=0), "remark": GSD_PRECISION}
+        more = {"origin": -0.5 * box.sum(axis=0)}
     numbers = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
     return particles_of(path, numbers, box, type_names=type_names, **more)
 

@@ -113,12 +113,7 @@ def _spheres(
 ) -> Results:
     """Store spheres of a table with the forces of their contacts, and give the verdict that the digits allow."""
     from faultgouge.analysis.files.configuration_file import write_configuration
-    from faultgouge.analysis.files.contact_tables import (
-        material_of,
-        of_material,
-        read_contacts,
-        verdict_within_digits,
-    )
+    from faultgouge.analysis.files.contact_tables import material_of, of_material, read_contacts, verdict_within_digits
     from faultgouge.analysis.files.formats import read_particles
     from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
 
@@ -179,8 +174,6 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         reads = "read_restart" if format_of(file) is RESTART else "units lj, atom_style sphere and read_data"
         says = f"For spheres, or another law, write a deck with {reads} {file.name}, its laws, its walls and a run,"
         raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
-    if disks.remark:
-        say(f"{file}: {disks.remark}")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"

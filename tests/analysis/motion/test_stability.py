@@ -19,23 +19,16 @@ RISE = np.tile([1.0, 0.0], (3, 1))
 
 
 def test_stability_of_three_disks():
-    found = stability(three_disks())
-    assert found.at_bound == 1
-    assert found.stable is None  # in no balance
-    assert "the packing moves" in found.reasons[0]
+    moves = stability(three_disks())  # in no balance
+    assert (moves.at_bound, moves.stable) == (1, None)
+    assert "the packing moves" in moves.reasons[0]
     at_rest = balanced(three_disks())
     told = stability(at_rest)
-    assert told.stable is True
-    assert told.one_sided.grows is False
+    assert (told.stable, told.one_sided.grows) == (True, False)
     assert told.one_sided.amplification > 0
     assert str(told).startswith("stable: each of 4 pushes comes to rest")
     assert "neither of two linear motions decides" in str(told)
     assert json.loads(json.dumps(told.as_dict()))["one_sided"]["pushes"] == told.one_sided["pushes"] == 4
-    assert set(told.as_dict()) >= {
-        "stable", "growth_rate", "undamped", "at_bound", "one_sided", "rising", "asymmetry", "creep", "largest_push",
-        "largest_energy", "push_time", "residual_push", "sticking", "sliding", "free", "searched", "reasons",
-        "not_followed", "remarks", "at_least", "first_change", "follow",
-    }  # fmt: skip
     rising, twice = (stability(at_rest, rise=size * RISE, time=4.0).rising for size in (1, 2))
     assert twice.drift == pytest.approx(2 * rising.drift, rel=1e-9)
     assert dict(rising) == rising.as_dict() | {"other_start": rising.other_start}

