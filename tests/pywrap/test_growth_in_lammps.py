@@ -36,9 +36,9 @@ def run(packing, reference, time, samples, dt):
 
 
 @pytest.mark.long
-def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
+def test_growth_rate_and_frequency_are_those_of_the_spectrum(climbed):
     """Over six decades of D, from a small start along the pair that coalesces first."""
-    packing = loaded(0.024)
+    packing = climbed(0.024)[-1].packing
     pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
     dt = time_step(packing)
     omega = complex(discrete_frequency(pair.eigenvalue, dt))
@@ -60,9 +60,9 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
 
 
 @pytest.mark.long
-def test_rounding_noise_grows_by_fifteen_decades(loaded):
+def test_rounding_noise_grows_by_fifteen_decades(climbed):
     """Nothing but noise to begin with: D rises from 1e-25 by fifteen decades, most of them at the spectrum's rate."""
-    packing = loaded(0.024)
+    packing = climbed(0.024)[-1].packing
     dt = time_step(packing)
     time, msd, _ = run(packing, packing, 1400.0, 7000, dt)
     noise = np.median(msd[time < 100])
@@ -74,9 +74,9 @@ def test_rounding_noise_grows_by_fifteen_decades(loaded):
 
 
 @pytest.mark.long
-def test_the_worst_start_grows_as_predicted(loaded):
+def test_the_worst_start_grows_as_predicted(climbed):
     """A start of 1e-8 along it, below the onset at 0.02183: far below the slip limits, and far above rounding."""
-    packing = loaded(0.0205, 0.0205 / 20)
+    packing = climbed(0.0205, 0.0205 / 20)[-1].packing
     predicted = transient_gain(packing)
     steps = int(np.ceil(predicted.time / (0.2 * time_step(packing))))
     start = displace(packing, predicted.start, 1e-8)
