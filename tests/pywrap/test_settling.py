@@ -36,8 +36,7 @@ def test_settled_packing_is_in_balance_and_ready_for_friction(keys, most):
     # zero slips: no term that is not symmetric, but for the rounding of products
     assert np.abs(matrix - matrix.T).max() < 1e-15 * np.abs(matrix).max()
     # the load rests on the floor, to the residual of each disk
-    floor = packing.contacts.floor
-    assert packing.normal_force[floor].sum() == pytest.approx(3.0 * packing.top.sum(), abs=1e-8)
+    assert packing.normal_force[packing.contacts.floor].sum() == pytest.approx(3.0 * packing.top.sum(), abs=1e-8)
     assert not packing.top[packing.rattlers].any()
     # the layer, a tenth, lies on the bed: of 17 disks in height it fills the upper two
     assert packing.top.sum() == len(packing) / 10
