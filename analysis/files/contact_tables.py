@@ -43,7 +43,7 @@ from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
 from .atomic_write import telling
-from .formats.disks import Disks, choose_frame
+from .formats.disks import Disks, choose_frame, places_of
 from .formats.tables import columns_of, contact_columns, lines_of, number_of, strip_comments
 
 HALF_A_DIGIT = 5e-6
@@ -111,11 +111,7 @@ def read_contacts(
     table = {name: column[np.any(forces, axis=0)] if forces else column for name, column in table.items()}
     ids = np.array([table["id1"], table["id2"]])
     wall = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
-    i, j = ends = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
-    known = spheres.id[ends] == ids
-    known[1] |= wall
-    for strange in ids[~known]:
-        raise PackingFileError(f"{path}: a contact names sphere {strange:g}, which is not in {spheres.source}.")
+    i, j = places_of(ids, spheres.id, path, np.array([np.zeros_like(wall), wall]))
     for itself in ids[0][ids[0] == ids[1]]:
         raise PackingFileError(f"{path}: sphere {itself:g} touches itself.")
     j[wall] = WALL

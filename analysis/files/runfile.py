@@ -82,12 +82,10 @@ class RunFile(AbstractContextManager["RunFile"]):
         self.path, self._writable = Path(path), mode == "a"
         self.saved, self._sound, self._next_save = True, True, 0.0
         self._file = open_sealed(self.path, self._writable)
-        if "snapshot" in self._file:
-            self._file.close()
-            says = "holds a packing as LAMMPS left it, and no run of ours: spectrum, draw take it"
+        if "parameters" not in self._file:
+            says = "holds no run of ours: of a packing as LAMMPS left it, spectrum and draw tell"
             raise PackingFileError(f"{self.path} {says}.")
-        with telling(self.path, "holds no run"):
-            self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
+        self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
 
     @classmethod
     def create(

@@ -36,11 +36,7 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     path = Path(path)
     try:
         content = read_plain(path)
-    except OSError as error:
-        raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
-    lines = content.decode("ascii", "ignore").replace(",", " ").splitlines()
-    rows = list(strip_comments(lines, 1))
-    try:
+        rows = list(strip_comments(content.decode("ascii", "ignore").replace(",", " ").splitlines(), 1))
         # a table is text whose first line that is no comment begins with a number
         if b"\0" in content or not rows or not re.match(r"[-+]?\.?\d|[-+]?(nan|inf)", rows[0][1][0], re.IGNORECASE):
             return of_trace(_record(path, channel))
@@ -48,6 +44,8 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
             raise SignalError("a table of two columns has no channels: leave channel out")
         wanted = "two are needed, time and value"
         return Signal(*columns_of(path, rows, ("time", "value"), wanted, more=False).values())
+    except OSError as error:
+        raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
     except PackingFileError as error:
         raise SignalError(str(error).rstrip(".")) from None
     except SignalError as error:

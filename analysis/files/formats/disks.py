@@ -142,6 +142,14 @@ class Disks:
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
+def places_of(ids: NDArray, known: Indices, source: object, elsewhere: NDArray | bool = False) -> Indices:
+    """Where IDs are among known ones, which are sorted; a PackingFileError for one that is not there, nor elsewhere."""
+    found = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+    for strange in ids[(known[found] != ids) & ~np.broadcast_to(elsewhere, ids.shape)]:
+        raise PackingFileError(f"{source}: a contact names particle {strange:g}, which is not there.")
+    return found
+
+
 def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
     """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
     wanted, few, many = -1 if frame is None else frame, min(counts, default=0), max(counts, default=0)
@@ -264,10 +272,7 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     """Contacts with the slips of the file, of which disks that do not touch may have none."""
     ids = np.array([slips.first, slips.second])
-    ends = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
-    for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
-        raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
-    ends[ids == 0] = FLOOR
+    ends = np.where(ids == 0, FLOOR, places_of(ids, disks.id, disks.source, ids == 0))
     i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
     listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
@@ -339,11 +344,9 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
         chosen = disks.named[text]
     elif kind == "ids" and value:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
-            if not re.fullmatch(r"\d+(-\d+)?", part):
-                raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            first, last = map(int, (part.split("-") * 2)[:2])
-            within = (first <= disks.id) & (disks.id <= last)
-            if within.sum() <= last - first:
+            first, _, last = part.partition("-")
+            within = (int(first) <= disks.id) & (disks.id <= int(last or first))
+            if within.sum() <= int(last or first) - int(first):
                 raise ValueError(f"{disks.source} has no disk {part}")
             chosen |= within
     else:

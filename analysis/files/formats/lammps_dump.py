@@ -34,7 +34,7 @@ from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text, telling
 from ..runfile import law_of_parameters
-from .disks import Disks, Slips, choose_frame, in_plane, packing_of, particles_of, standard_names
+from .disks import Disks, Slips, choose_frame, in_plane, packing_of, particles_of, places_of, standard_names
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
@@ -180,10 +180,7 @@ def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None 
         disk |= dict(zip(("x", "y", "x_low", "y_low"), (*place.T, *low.T), strict=True))
     found = _disks(path, shown, disk | {"top": disk["type"] == TOP_TYPE})
     ids, radius, position = found.id, found.radius, found.position[:, :2]
-    listed = np.array([pair["id1"], pair["id2"]])
-    i, j = np.minimum(np.searchsorted(ids, listed), len(ids) - 1)
-    if np.any(ids[[i, j]] != listed):
-        raise PackingFileError(f"{beside} has a contact of a disk that {path} does not have.")
+    i, j = places_of(np.array([pair["id1"], pair["id2"]]), ids, beside)
     # LAMMPS lists pairs up to its cutoff
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]
