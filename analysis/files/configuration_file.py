@@ -11,8 +11,7 @@ The file is sealed like every run.h5 (:mod:`.atomic_write`), and is H5MD 1.1::
 """
 
 from collections.abc import Mapping
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,19 +81,14 @@ def read_configuration(path: Path) -> Configuration:
                 given[name] = group[name][()]
                 continue
             parts = {part: group[name][part][()] for part in PARTS[name] if part in group[name]}
-            if name == "contacts":
-                given[name] = LinearisedContacts(**parts)
-            else:
-                given[name] = csr_array(tuple(parts.values()), shape=(len(parts["indptr"]) - 1,) * 2)
-                given[name].check_format()
+            sparse = name != "contacts"
+            rows = len(parts["indptr"]) - 1 if sparse else 0
+            given[name] = csr_array((*parts.values(),), (rows, rows)) if sparse else LinearisedContacts(**parts)
         return Configuration(**given)
 
 
 def write_h5md(file: "h5py.File") -> None:
-    """The version of H5MD, and what has written the file; no version where it is not installed."""
-    program = ""
-    with suppress(PackageNotFoundError):
-        program = version("faultgouge")
+    """The version of H5MD, and what has written the file."""
     file.create_group("h5md").attrs["version"] = np.array([1, 1])
     file.create_group("h5md/author").attrs["name"] = "faultgouge"
-    file.create_group("h5md/creator").attrs.update({"name": "faultgouge", "version": program})
+    file.create_group("h5md/creator").attrs.update({"name": "faultgouge", "version": version("faultgouge")})

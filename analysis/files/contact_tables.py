@@ -90,7 +90,7 @@ def _fstat(path: Path, frame: int) -> dict[str, Floats]:
     """The contacts of MercuryDPM at one time, whose lines follow a line "# time ...", and two more comments."""
     lines = lines_of(path)
     starts = [k for k, line in enumerate(lines) if re.match(r"#\s+\d", line)]
-    chosen = choose_frame(path, [0] * len(starts), frame)
+    chosen = choose_frame(path, len(starts), frame)
     begin, end = [*starts, len(lines)][chosen : chosen + 2]
     table = columns_of(path, strip_comments(lines[begin:end], begin + 1), FSTAT, f"{len(FSTAT)} are needed")
     return table | {f"ft{axis}": table["ft"] * table[f"t{axis}"] for axis in "xyz"}

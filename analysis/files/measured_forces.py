@@ -73,7 +73,7 @@ def measured_forces(
     """
     disks, rows = _rows(particles, 5, 6), _rows(contacts, 5)
     steps = np.unique(rows[:, 0])
-    step = steps[choose_frame(contacts, [0] * len(steps), frame)]
+    step = steps[choose_frame(contacts, len(steps), frame)]
     disks = disks[disks[:, 0] == step][:, 1:] if disks.shape[1] == 6 else disks
     rows, ids, centre, radius = rows[rows[:, 0] == step], disks[:, 0], disks[:, 1:3], disks[:, 3]
     walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
@@ -113,10 +113,10 @@ def measured_forces(
         for _ in range(DRAWN_FORCES):
             drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
             seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
-        draws = (
-            f"unstable in {seen.count(False)} and not known in {seen.count(None)} of {DRAWN_FORCES} draws of the forces"
+        words = f"unstable in {seen.count(False)} and not known in {seen.count(None)} of {DRAWN_FORCES} draws of the"
+        chance = (
+            f"{words} forces within an error of f_n of {error:.2g}, if a load on each disk balanced the forces drawn"
         )
-        chance = f"{draws} within an error of f_n of {error:.2g}, if a load on each disk balanced the forces drawn"
     # motions of the disks in contact that stretch no spring, without translations and rotation as a whole
     c, none = found.contacts, np.zeros_like(found.contacts.normal)
     sticking = np.where(c.at_bound, 0.0, c.tangential_stiffness)

@@ -271,12 +271,12 @@ class RunFile(AbstractContextManager["RunFile"]):
         centres, length, and their low parts if there are any.
         """
         begin, low = len(self._file[f"{POSITION}/step"]), {} if position_low is None else {"position_low": position_low}
-        new: dict[str, ArrayLike] = {"value": np.pad(position, ((0, 0), (0, 0), (0, 1))), "time": time}
-        new["step"] = np.arange(begin, begin + len(np.atleast_1d(time)))
+        place = np.pad(position, ((0, 0), (0, 0), (0, 1)))
+        new = {"value": place, "time": time, "step": np.arange(begin, begin + len(place))}
         with self.change():
             self.append_series("trajectory", time=time, **low)
             for name, data in self._rows_of_frames.items():
-                data.resize(begin + len(position), axis=0)
+                data.resize(begin + len(place), axis=0)
                 if name.startswith(POSITION):
                     data[begin:] = new[name.rpartition("/")[2]]
                 elif name in ("observables/fx/value", "observables/fy/value", f"{EDGES}/value"):

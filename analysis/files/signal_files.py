@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import PackingFileError
 from ..responses.signals import Signal, SignalError
-from .atomic_write import read_plain
+from .atomic_write import read_plain, telling
 from .formats.tables import columns_of, strip_comments
 
 
@@ -59,15 +59,10 @@ def write_table(signal: Signal, path: Path) -> None:
 
 def _record(path: Path, channel: str | None) -> Any:
     """The trace of a record that is meant."""
-    try:
+    with telling(path, "is no table of two columns, and no record that pip install 'faultgouge[seismic]' reads"):
         from obspy import read
 
         traces = list(read(str(path)))
-    except ImportError:
-        raise SignalError('it is no table of two columns; records need pip install "faultgouge[seismic]"') from None
-    except Exception as error:  # whatever the reader of the format raises on a broken file
-        reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
-        raise SignalError(f"it is no table of two columns, and no record ({reason}): give another file") from None
     found = [trace for trace in traces if channel is None or trace.id.endswith(channel)]
     if len(found) != 1:
         fits = "it has" if channel is None else f'channel = "{channel}" fits {len(found) or "none"} of'

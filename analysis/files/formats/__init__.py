@@ -112,7 +112,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     path : Path
         The file, of a format of `READERS`.
     frame : int, optional
-        Number of the frame; negative numbers count from the last.
+        Number of the frame, by default the last; negative numbers count from the last.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     with telling(path, f"is not read as {found.words}"):
-        read: Disks = _function(found.reader)(path, *([frame] if found.frames else []))
+        read: Disks = _function(found.reader)(path, *([-1 if frame is None else frame] if found.frames else []))
     return read
 
 

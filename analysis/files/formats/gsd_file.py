@@ -30,11 +30,10 @@ def _hoomd(path: Path) -> Any:
         return import_module("gsd.hoomd")
 
 
-def read_gsd(path: Path, frame: int | None = None) -> Disks:
-    """A frame of a GSD file; the last one by default, if all are of as many disks."""
+def read_gsd(path: Path, frame: int) -> Disks:
+    """A frame of a GSD file."""
     with _hoomd(path).open(str(path), "r") as file:
-        counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
-        shown = file[choose_frame(path, counts, frame)]
+        shown = file[choose_frame(path, len(file), frame)]
     log, particles = shown.log, shown.particles
     type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
     columns = {key.removeprefix(OWN_QUANTITIES): log[key] for key in log if key.startswith(OWN_QUANTITIES)}
