@@ -235,23 +235,21 @@ def lock_output(path: Path) -> Iterator[None]:
     """
     lock = lock_of(path)
     try:
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        stream = lock.open("ab")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
-    held = False
-    try:
+    with stream:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            held = os.path.samestat(os.fstat(descriptor), lock.stat())  # or who had it before has just removed it
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held = os.path.samestat(os.fstat(stream.fileno()), lock.stat())  # or who had it before has just removed it
         except OSError as error:  # another has it, or there are no locks on this file system
             held = not isinstance(error, BlockingIOError | FileNotFoundError)
         if not held:
             raise OutputError(f"{path} cannot be written, since another run is writing it: give another name, or wait.")
-        yield
-    finally:
-        if held:
+        try:
+            yield
+        finally:
             lock.unlink(missing_ok=True)
-        os.close(descriptor)
 
 
 def lock_of(path: Path) -> Path:

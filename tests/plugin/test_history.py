@@ -20,9 +20,8 @@ arithmetics = pytest.mark.parametrize("compensated", [False, True], ids=["double
 def on(other, overlap, slip, compensated=False, law=LAW):
     """Disk 0 on another disk, whose number is 1, or on the floor, which has -1."""
     position = np.array([[1.0, 3.0], [1.0, 4.0 - overlap]] if other == 1 else [[1.0, 0.5 - overlap]])
-    low = np.zeros_like(position) if compensated else None
-    contact, radius = Contacts([0], [other], [slip]), [0.5] * len(position)
-    return Packing(position=position, radius=radius, contacts=contact, law=law, position_low=low)
+    more = {"contacts": Contacts([0], [other], [slip]), "position_low": 0 * position if compensated else None}
+    return Packing(position=position, radius=[0.5] * len(position), law=law, **more)
 
 
 def pressed(packing, closer, turned=0.0):
@@ -60,8 +59,7 @@ def test_slipping_and_pressing_at_once_is_second_order_in_the_step(other):
         # s delta^(1/2) = c (integral of delta^(1/2) over the slip) with delta from 1e-3 to 4e-3
         exact = -1e-4 * (2 / 3) * (4e-3**1.5 - 1e-3**1.5) / 3e-3 / np.sqrt(4e-3)
         errors.append(abs(packing.contacts.slip[0] - exact))
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
-    assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.05)
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2.0, 2.0], abs=0.05)
 
 
 SCRIPT = Path(__file__).with_name("inputs").joinpath("two_disks.in").read_text()
@@ -117,8 +115,8 @@ def slider_and_theirs(forces_after, legs, *, wall=False, radius=0.5, refined=1):
     ours = f"mindlin/smooth {KN} {KT} 0.5 {{}}history coulomb"
     pairs = f"pair_style {ours.format('')}\npair_coeff * *\n", f"pair_style granular\npair_coeff * * {theirs}\n"
     floors = f"wall/{ours.format('ylo 0.5 ')}", f"wall/gran granular {theirs} yplane 0.5 NULL"
-    kind = {"radius": radius, "refined": refined}
-    return [forces_after(pairs[k], legs, floor=floors[k] if wall else None, **kind) for k in (0, 1)]
+    floors = floors if wall else (None, None)
+    return [forces_after(pairs[k], legs, floor=floors[k], radius=radius, refined=refined) for k in (0, 1)]
 
 
 SPINS = (1e-2, 0, 3e-3, 0, -5e-4, -2e-2, 0, 0, 0, 4e-3)
@@ -179,30 +177,28 @@ def test_a_vibration_shakes_contacts_down_to_the_default_matrix(reference_packin
             assert np.abs(measured - slides @ direction).max() > 1e3 * scale
 
 
-@pytest.mark.parametrize(
-    ("history", "seed", "fx", "perturbation", "fitted", "within", "apart"),
-    [
-        # a few per cent below that of K, since tangential forces fall meanwhile
-        ("rescaled", 5, 0.3, {"time": 10.0, "amplitude": 1e-7, "omega": 50.0}, (1e-17, 1e-13), (0.93, 1.0), 1.1),
-        # four contacts are at the bound; in five packings 0.87 to 1.13: the mean is the first harmonic alone
-        pytest.param(
-            "coulomb", 2, 0.6, {"time": 64.0, "amplitude": 1e-9, "omega": 30.0}, (1e-16, 1e-9), (0.85, 1.15), 1.6,
-            marks=pytest.mark.long,
-        ),
-    ],
-    ids=["rescaled", "slider"],
-)  # fmt: skip
+GROWTHS = {
+    # a few per cent below that of K, since tangential forces fall meanwhile
+    "rescaled": (5, 0.3, {"time": 10.0, "amplitude": 1e-7, "omega": 50.0}, (1e-17, 1e-13), (0.93, 1.0), 1.1),
+    # four contacts are at the bound; in five packings 0.87 to 1.13: the mean is the first harmonic alone
+    "coulomb": (2, 0.6, {"time": 64.0, "amplitude": 1e-9, "omega": 30.0}, (1e-16, 1e-9), (0.85, 1.15), 1.6),
+}
+"""Seed, F_x, pushes, amplitudes of the fit, limits of the rate over the default one, and how far off others are."""
+
+
+@pytest.mark.parametrize("history", ["rescaled", pytest.param("coulomb", marks=pytest.mark.long)])
 @pytest.mark.slow
-def test_growth_is_that_of_the_mean_of_both_derivatives(history, seed, fx, perturbation, fitted, within, apart):
+def test_growth_is_that_of_the_mean_of_both_derivatives(history):
     """D(t) of an undamped run. K with one of both derivatives for all contacts, or in which sliders slide on, is far
     off."""
+    seed, fx, perturbation, fitted, within, apart = GROWTHS[history]
     sections = {"packing": {"disks": 100, "width": 11.9, "seed": seed}, "law": {"kn": 2e5, "history": history}}
     sections |= {"load": {"fy": 3.0}, "ramp": {"step": fx / 100, "until": fx}, "perturb": {"fx": fx, **perturbation}}
     scene = Scene.from_mapping(sections)
     *_, last = ramp(scene)
     others = [{"parting": 0.0}, {"parting": 1.0}]
     if history == "coulomb":
-        assert last.packing.law.at_bound(last.packing.geometry.overlap, last.packing.contacts.slip).any()
+        assert last.packing.sliding.any()
         others += [{"sliding": True}]
 
     def rate(**branch):

@@ -17,11 +17,9 @@ SIGNALS = {
     "cosine": ("cosine 0.3 2.0", "0.3*cos(2.0*step*dt)"),
     "pulse": ("pulse 0.3 3.0", f"0.3*(1-2*{X}*{X})*exp(-{X}*{X})"),
     "sweep": ("sweep 0.3 2.0 5.0 6.0", "0.3*sin(2.0*step*dt+0.5*3.0*(step*dt)^2/6.0)"),
-    "record": (
-        "record v_name scale 3 stretch 2",
-        "3*ternary(step*dt<3,-0.25*step*dt/3,ternary(step*dt<=4,-0.25+1.25*(step*dt-3),0))",
-    ),
 }
+RECORD = "3*ternary(step*dt<3,-0.25*step*dt/3,ternary(step*dt<=4,-0.25+1.25*(step*dt-3),0))"
+SIGNALS["record"] = ("record v_name scale 3 stretch 2", RECORD)
 
 
 @pytest.mark.parametrize("kind", SIGNALS)

@@ -129,8 +129,8 @@ def test_an_onset_is_the_same_in_any_units(units, damped):
 @pytest.mark.parametrize("units", [TOGETHER[0], *(pytest.param(each, marks=pytest.mark.long) for each in TOGETHER[1:])])
 def test_what_is_written_is_read_in_any_units(units, tmp_path, faultgouge_here):
     """Exports come back to the bit, and an import is in balance; draw and view take it."""
-    for name, (length, force, mass) in (("own", (1.0, 1.0, 1.0)), ("other", units)):
-        packing = settle(scene(length, force, mass)).packing
+    for name, own in (("own", (1.0, 1.0, 1.0)), ("other", units)):
+        packing = settle(scene(*own)).packing
         store(tmp_path / f"{name}.h5", packing)
         for suffix in (".xyz", ".data"):
             faultgouge_here("export", f"{name}.h5", "-o", f"{name}{suffix}")

@@ -11,12 +11,8 @@ from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, SceneError, equilibrate, ramp, reach
 from faultgouge.pywrap.runs.undamped import time_step
 
-SCENE = {
-    "packing": {"file": str(REFERENCE)},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 2e-3, "until": 0.02},
-}
+SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+SCENE |= {"ramp": {"step": 2e-3, "until": 0.02}}
 
 
 def ramped(mapping, step, until):

@@ -74,13 +74,9 @@ def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, equilibria, share
 
 
 COSINE = {"amplitude": 1e-6, "omega": 3.0}
-FORCED = {
-    "cosine": COSINE,
-    "cosine, compensated": COSINE,
-    "cosine, damped": COSINE,
-    "pulse, compensated": {"signal": "pulse", "amplitude": 1e-6, "omega": 20.0},
-    "moving floor": {"signal": "pulse", "on": "floor", "amplitude": 1e-6, "omega": 20.0},
-}
+PULSE = {"signal": "pulse", "amplitude": 1e-6, "omega": 20.0}
+FORCED = dict.fromkeys(["cosine", "cosine, compensated", "cosine, damped"], COSINE)
+FORCED |= {"pulse, compensated": PULSE, "moving floor": PULSE | {"on": "floor"}}
 
 
 def perturbed_scene(kind):

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from ...arrays import Floats
 from ...configuration import Configuration
@@ -29,6 +29,8 @@ __all__ = [
     "Disks", "ModeVectors", "Slips", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
+
+Columns: TypeAlias = Mapping[str, Floats]
 
 RESTART_BEGINNING = b"LammpS RestartT"
 """How restarts of LAMMPS begin."""
@@ -110,7 +112,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     path : Path
         The file, of a format of `READERS`.
     frame : int, optional
-        Number of the frame; negative numbers count from the last.
+        Number of the frame, by default the last; negative numbers count from the last.
 
     Raises
     ------
@@ -125,7 +127,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     with telling(path, f"is not read as {found.words}"):
-        read: Disks = _function(found.reader)(path, *([frame] if found.frames else []))
+        read: Disks = _function(found.reader)(path, *([-1 if frame is None else frame] if found.frames else []))
     return read
 
 
@@ -150,10 +152,7 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
 
 
 def write_packing(
-    path: Path,
-    packing: Packing | Configuration,
-    modes: Sequence[ModeVectors] = (),
-    values: Mapping[str, Floats] | None = None,
+    path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = (), values: Columns | None = None
 ) -> str:
     """Write a packing for another code.
 

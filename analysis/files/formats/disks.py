@@ -68,16 +68,9 @@ def standard_names(source: object, columns: Mapping[str, Floats], *needed: str) 
 
 
 class Slips(NamedTuple):
-    """Slips of contacts, by the IDs of their disks.
+    """Slips of contacts, along tau, length, with low parts if there are any, by the IDs of their disks; 0 is the floor.
 
-    Attributes
-    ----------
-    first, second : ndarray of int, shape (C,)
-        IDs; a second ID of 0 is the floor.
-    slip, low : ndarray, shape (C,)
-        Along tau, length; and low parts if there are any.
-    complete : bool
-        Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
+    If they are not `complete`, all touching disks are in contact, and contacts that are not listed have no slip.
     """
 
     first: Indices
@@ -95,14 +88,10 @@ class Disks:
     ----------
     source : str
         The file and the place in it, or another origin of the particles.
-    position : ndarray, shape (N, 2), of spheres (N, 3)
-        Centres, length.
-    radius : ndarray, shape (N,)
-        Radii, length.
-    id : ndarray of int, shape (N,)
-        IDs of the file; of disks from 1.
-    mass, angle, top, position_low : ndarray or None
-        Mass, orientation, whether in the upper layer, low parts of the centres; None if absent.
+    position, position_low : ndarray, shape (N, 2), of spheres (N, 3)
+        Centres, length, and their low parts, if there are any.
+    radius, id, mass, angle, top : ndarray, shape (N,)
+        Radii, length; IDs of the file, of disks from 1; mass, orientation, whether in the upper layer: None if absent.
     box_length : float or None
         Period along x; None if the sides are open.
     named : mapping of ndarray of bool, each of shape (N,)
@@ -142,14 +131,19 @@ class Disks:
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
-def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
-    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
-    wanted, few, many = -1 if frame is None else frame, min(counts, default=0), max(counts, default=0)
-    if frame is None and few < many:
-        raise PackingFileError(f"{path} has frames with {few} and {many} particles: choose one with --frame.")
-    if not -len(counts) <= wanted < len(counts):
-        raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
-    return wanted % len(counts)
+def places_of(ids: NDArray, known: Indices, source: object, elsewhere: NDArray | bool = False) -> Indices:
+    """Where IDs are among known ones, which are sorted; a PackingFileError for one that is not there, nor elsewhere."""
+    found = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+    for strange in ids[(known[found] != ids) & ~np.broadcast_to(elsewhere, ids.shape)]:
+        raise PackingFileError(f"{source}: a contact names particle {strange:g}, which is not there.")
+    return found
+
+
+def choose_frame(path: Path, count: int, frame: int) -> int:
+    """The number of the chosen one of some frames, from 0; negative numbers count from the end."""
+    if not -count <= frame < count:
+        raise PackingFileError(f"{path} has {count} frames; there is no --frame {frame}.")
+    return frame % count
 
 
 def particles_of(
@@ -264,10 +258,7 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     """Contacts with the slips of the file, of which disks that do not touch may have none."""
     ids = np.array([slips.first, slips.second])
-    ends = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
-    for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
-        raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
-    ends[ids == 0] = FLOOR
+    ends = np.where(ids == 0, FLOOR, places_of(ids, disks.id, disks.source, ids == 0))
     i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
     listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
@@ -339,11 +330,9 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
         chosen = disks.named[text]
     elif kind == "ids" and value:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
-            if not re.fullmatch(r"\d+(-\d+)?", part):
-                raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            first, last = map(int, (part.split("-") * 2)[:2])
-            within = (first <= disks.id) & (disks.id <= last)
-            if within.sum() <= last - first:
+            first, _, last = part.partition("-")
+            within = (int(first) <= disks.id) & (disks.id <= int(last or first))
+            if within.sum() <= int(last or first) - int(first):
                 raise ValueError(f"{disks.source} has no disk {part}")
             chosen |= within
     else:
