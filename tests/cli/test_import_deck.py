@@ -129,12 +129,10 @@ def test_a_line_at_which_lammps_stops(faultgouge_here, taken, tmp_path):
     """The state of the runs before it is kept."""
     deck = PILE["contacts"].replace("run 6000", "run 1500\ncompute what all no/such/style")
     said, _ = taken(deck, name="stops", code=1)
-    assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
-    assert "is kept in stops.restart, and the deck stops.restart.in beside it goes on from there" in said
+    assert re.search("LAMMPS stopped: Unrecognized compute style .* is kept in stops.restart, and the deck stops", said)
     assert "3 spheres, " in faultgouge_here("import", "stops.restart", "--relax", "-o", "stops.h5").stdout
     said, _ = taken(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"), name="lost", code=1)
-    assert "Lost atoms: original 3 current 0" in said
-    assert "The state is not kept: LAMMPS stopped: Lost atoms" in said
+    assert re.search("Lost atoms: original 3 current 0.*The state is not kept: LAMMPS stopped: Lost atoms", said)
     assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 

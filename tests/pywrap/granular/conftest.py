@@ -51,12 +51,12 @@ def two(lammps_with):
 
 
 @pytest.fixture(scope="session")
-def beds(tmp_path_factory) -> Callable[..., Any]:
-    """Particles at rest on a slope, by law, dimension and whether they have dashpots; made once each, not to be
-    changed."""
+def bed(tmp_path_factory) -> Callable[..., Any]:
+    """LAMMPS with particles at rest on a slope, none of whose contacts is at the bound, and their configuration, by
+    law, dimension and whether they have dashpots; made once each, not to be changed."""
 
     @cache
-    def make(law: str, d: int, damped: bool):
+    def make(law: str, d: int, damped: bool = True):
         # with 3 a contact of these disks comes to rest at the bound
         mu = "10.0" if (law, d, damped) == ("mindlin_rescale", 2, True) else "3.0"
         dashpots, e = ("40", "40" if damped else ALMOST_NONE), ("0.2", "0.2" if damped else "1.0")
@@ -69,18 +69,6 @@ def beds(tmp_path_factory) -> Callable[..., Any]:
                 break
         if not damped:
             with_law(lmp, law, d, ALMOST_NONE, "", ("1.0", "1.0"), mu)
-        return lmp
-
-    return make
-
-
-@pytest.fixture(scope="module")
-def bed(beds):
-    """LAMMPS with particles at rest, none of whose contacts is at the bound, and their configuration."""
-
-    @cache
-    def make(law, d, damped: bool = True):
-        lmp = beds(law, d, damped)
         return lmp, faultgouge.from_lammps(lmp)
 
     return make

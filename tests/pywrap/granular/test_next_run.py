@@ -26,8 +26,8 @@ def sliding(log, count: int, slope: float, law: str, timestep: float, more: str)
 def state(lmp) -> np.ndarray:
     """All that moves, in the order of the IDs."""
     count = lmp.extract_setting("nlocal")
-    arrays = (lmp.numpy.extract_atom(name)[:count] for name in ("id", "x", "v", "omega", "f", "torque"))
-    rows = np.column_stack(list(arrays))
+    names = ("id", "x", "v", "omega", "f", "torque")
+    rows = np.column_stack([lmp.numpy.extract_atom(name)[:count] for name in names])
     return rows[np.argsort(rows[:, 0])]
 
 
