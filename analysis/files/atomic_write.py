@@ -11,8 +11,7 @@ the format: ``faultgouge_format=1`` in a comment or another place that readers o
 A *sealed* file of HDF5 begins with a text header of 512 bytes: a description of the file, the SHA-256 of all following
 bytes, and its length. A single flipped byte is then detected. HDF5 looks for its superblock at the bytes 0, 512, 1024,
 ... (the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file. The checksum
-says that the content is what was written. It covers neither other files to which HDF5 may link, nor what a few bytes
-unpack to: both are refused.
+says that the content is what was written. It does not cover other files to which HDF5 may link: these are refused.
 
 Files that users name for reading must be plain: a pipe or a device may never end, and cannot be read twice.
 """
@@ -24,7 +23,6 @@ import fcntl
 import gzip
 import hashlib
 import json
-import math
 import os
 import secrets
 import stat
@@ -46,17 +44,9 @@ HEADER_SIZE = 512
 SEAL, HDF5 = b"faultgouge run file, sealed\n", b"\x89HDF\r\n\x1a\n"
 """How files of HDF5 begin: those of this program, and those of others."""
 
-FORMAT = 1
-"""Number of the format of all files that this program writes. Files of a later one are refused."""
-
-FORMAT_KEY = "faultgouge_format"
-"""Name of this number in a file: what has this name near its beginning or its end has been written by this program."""
-
-OLD_DATA = b"# faultgouge sides="
-"""How LAMMPS data begin that this program wrote before there was a number."""
-
-MARK_BYTES = 1 << 16
-"""Bytes at the beginning and at the end of a file among which the mark is."""
+FORMAT, FORMAT_KEY = 1, "faultgouge_format"
+"""Number of the format of all files that this program writes, of which later ones are refused; and its name in a file:
+what has this name near its beginning or its end has been written by this program."""
 
 MARK = f"{FORMAT_KEY}={FORMAT}"
 TRAILERS = {
@@ -68,22 +58,14 @@ TRAILERS = {
 """What ends a file of these formats, as a comment. The writers of PNG, JSON, extended XYZ, LAMMPS data and GSD give the
 number themselves."""
 
-LONGEST_NAME = 200
-"""Letters of a name that other names beside it begin with: file systems take 255 bytes."""
-
 
 @contextmanager
 def telling(path: object, says: str, errors: type[Exception] = Exception) -> Iterator[None]:
     """Tell in one sentence, a PackingFileError, what fails within, unless a sentence tells it already.
 
-    Parameters
-    ----------
-    path : object
-        The file, or another source.
-    says : str
-        What of it, as in "is no readable GSD file"; the reason of the error follows.
-    errors : type
-        What is told; by default all that readers meet in damaged files, or of another format than their name says.
+    `path` is the file, or another source; `says` what of it, as in "is no readable GSD file"; the reason of the error
+    follows. `errors` are what is told; by default all that readers meet in files that are damaged, or of another format
+    than their name says.
     """
     try:
         yield
@@ -138,22 +120,12 @@ def read_plain_text(path: str | PathLike[str]) -> str:
 def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
     """Yield the name of a new file, and put this file, marked, in the place of the old one in one step.
 
-    File and folder are on the storage device when this returns.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    head : str
-        Of a format without a mark: how the files begin that may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written, or is read-only, or is not of this program. What it held before is still there.
+    File and folder are on the storage device when this returns. `head` is how the files of a format without a mark
+    begin that may be replaced. An OutputError if the file cannot be written, or is read-only, or is not of this
+    program; what it held before is still there.
     """
-    target = Path(os.path.realpath(path))
-    part = target.with_name(f".{target.stem[:LONGEST_NAME]}.{secrets.token_hex(8)}.part{target.suffix}")
+    target = Path(os.path.realpath(path))  # names of files may have 255 bytes
+    part = target.with_name(f".{target.stem[:200]}.{secrets.token_hex(8)}.part{target.suffix}")
     try:
         check_own(target, head)
         part.open("xb").close()  # a file of its own, or an error
@@ -198,11 +170,11 @@ def check_own(path: Path, head: str = "") -> None:
     if not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):  # root may write what is read-only
         raise OutputError(f"{path} cannot be written: it is read-only; make it writeable, or give another name.")
     with path.open("rb") as stream:
-        begin = stream.read(MARK_BYTES)
-        stream.seek(-min(MARK_BYTES, path.stat().st_size), os.SEEK_END)
-        end = stream.read()
-    own = begin.startswith((SEAL, OLD_DATA)) or bool(head and begin.startswith(head.encode()))
-    if begin and not own and FORMAT_KEY.encode() not in begin + b"\n" + end:
+        begin = stream.read(1 << 16)
+        stream.seek(max(0, path.stat().st_size - (1 << 16)))
+        both = begin + b"\n" + stream.read()
+    own = begin.startswith(SEAL) or bool(head and begin.startswith(head.encode())) or FORMAT_KEY.encode() in both
+    if begin and not own:
         says = f"{path} is there already, and faultgouge has not written it (or a version without numbers of formats)"
         raise OutputError(f"{says}: give another name, or move the file away.")
 
@@ -234,11 +206,8 @@ def write_json(path: Path, value: Mapping[str, Any], *, allow_nan: bool = True) 
 def check_output(path: Path, *inputs: Path, head: str = "") -> None:
     """Refuse a file that cannot be written, before work starts whose result goes there.
 
-    Raises
-    ------
-    OutputError
-        If the folder of the file does not exist, or may not be written to, or the file is a folder, one of the
-        inputs, read-only, or not of this program (see `check_own` for `head`).
+    An OutputError if the folder of the file does not exist, or may not be written to, or the file is one of the inputs,
+    or none that `check_own` lets replace.
     """
     if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
@@ -266,29 +235,27 @@ def lock_output(path: Path) -> Iterator[None]:
     """
     lock = lock_of(path)
     try:
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        stream = lock.open("ab")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
-    held = False
-    try:
+    with stream:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            held = os.path.samestat(os.fstat(descriptor), lock.stat())  # or who had it before has just removed it
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held = os.path.samestat(os.fstat(stream.fileno()), lock.stat())  # or who had it before has just removed it
         except OSError as error:  # another has it, or there are no locks on this file system
             held = not isinstance(error, BlockingIOError | FileNotFoundError)
         if not held:
             raise OutputError(f"{path} cannot be written, since another run is writing it: give another name, or wait.")
-        yield
-    finally:
-        if held:
+        try:
+            yield
+        finally:
             lock.unlink(missing_ok=True)
-        os.close(descriptor)
 
 
 def lock_of(path: Path) -> Path:
     """The lock file of a file or a folder."""
     target = Path(os.path.realpath(path))
-    return target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
+    return target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:200]}.lock")
 
 
 def new_sealed() -> h5py.File:
@@ -322,27 +289,20 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
 
     with telling(path, "cannot be read", OSError), open_plain(path) as stream:
         header, image = stream.read(HEADER_SIZE), stream.read()
-    if header.startswith(HDF5):
-        raise PackingFileError(f"{path} is an HDF5 file, and no run of faultgouge.")
     if not header.startswith(SEAL):
+        kind = "an HDF5 file" if header.startswith(HDF5) else "no HDF5 file"
         convert = f"`faultgouge import {path} -o packing.h5` converts files of other codes"
-        raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
+        raise PackingFileError(f"{path} is {kind}, and no run of faultgouge: {convert}.")
     if header != _header(image):
-        raise PackingFileError(
-            f"{path} is damaged: its {len(image)} bytes do not have the checksum: take a copy of it."
-        )
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        raise PackingFileError(f"{path} is damaged, as its checksum is another: take a copy of it.")
     with telling(path, "is damaged, or is none of this program's files"):
         file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW if writable else 0))
         names = list[str]()
         file.visit_links(names.append)
         for name in names:
             outside = isinstance(file.get(name, getlink=True), h5py.ExternalLink)
-            if not outside and isinstance(item := file[name], h5py.Dataset):
-                largest = max(item.nbytes, math.prod(item.chunks or ()) * item.dtype.itemsize)
-                outside = item.external or item.is_virtual or largest > memory
-            if outside:
+            if outside or (isinstance(item := file[name], h5py.Dataset) and (item.external or item.is_virtual)):
                 file.close()
-                raise ValueError(f"/{name} has its numbers in another file, or more than this machine has memory")
+                raise ValueError(f"/{name} has its numbers in another file")
         check_format(file.attrs.get(FORMAT_KEY), path)
         return file

@@ -30,7 +30,7 @@ def test_tables_as_others_write_them(read, text, name):
     assert (disks.position.tolist(), disks.radius.tolist()) == ([[1.25, 0.5], [2.24, 0.5]], [0.5, 0.5])
 
 
-ROW = "id,x [mm],y [mm],radius [mm]\n1,1,0.5,0.5\n2,1.999,0.5,0.5\n3,3.2,0.5,0.5\n4,1.5,1.365,0.5\n"
+ROW = "id,x,y,radius\n1,1,0.5,0.5\n2,1.999,0.5,0.5\n3,3.2,0.5,0.5\n4,1.5,1.365,0.5\n"
 
 
 def with_slips(read, tmp_path, rows, head="id1;id2;slip"):

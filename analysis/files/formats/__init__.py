@@ -1,6 +1,6 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
-`FORMATS` has a line for each format that is read, and `WRITERS` one for each that is written: the function of the
+`READERS` has a line for each format that is read, and `WRITERS` one for each that is written: the function of the
 module that does it, imported when a file of the format is used. A reader returns `Disks`; `packing_of` makes a packing
 of them, and `upper_layer` finds the layer that carries the load. `settling.relax` brings a packing out of balance to
 rest. A writer takes `Exported`, the columns of a Packing or of a Configuration.
@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from ...arrays import Floats
 from ...configuration import Configuration
@@ -30,54 +30,39 @@ __all__ = [
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 
+Columns: TypeAlias = Mapping[str, Floats]
+
 RESTART_BEGINNING = b"LammpS RestartT"
 """How restarts of LAMMPS begin."""
 
-WORD_OF_NUMBER = re.compile(r"[-+.\deE]+")
-
 
 class Format(NamedTuple):
-    """A format that is read.
+    """A format that is read: what it is, module and function of its reader, and whether a file may have several frames.
 
-    Attributes
-    ----------
-    words : str
-        What it is.
-    reader : str
-        Module of this package, and function. Restarts are read by LAMMPS itself, in pywrap.
-    suffixes : tuple of str
-        Of files. Of a format that the first line tells, what that line is.
-    frames : bool
-        Whether a file may hold several frames.
+    Restarts are read by LAMMPS itself, in pywrap.
     """
 
     words: str
     reader: str
-    suffixes: tuple[str, ...]
     frames: bool = False
 
 
-DATA = Format("LAMMPS data (atom style sphere)", "lammps_data.read_data", (".data",))
-DUMP = Format("LAMMPS dump", "lammps_dump.read_custom_dump", (".dump", ".lammpstrj"), frames=True)
-RESTART = Format("LAMMPS restart", "", (".restart",))
-YADE = Format("YADE's text", "tables.read_yade", ("line 1 is #format x_y_z_r",))
-MERCURY = Format("MercuryDPM's data", "tables.read_mercury", (".data, line 1 is N time bounds",), frames=True)
-FORMATS = (
-    Format("dumps of the decks", "lammps_dump.read_deck_dump", (".disks",), frames=True),
-    Format("extended XYZ", "xyz.read_xyz", (".xyz", ".extxyz"), frames=True),
-    DATA,
-    DUMP,
-    RESTART,
-    Format("tables", "tables.read_table", (".csv", ".txt")),
-    Format("packing.json", "tables.read_json", (".json",)),
-    Format("GSD", "gsd_file.read_gsd", (".gsd",), frames=True),
-    YADE,
-    MERCURY,
-)
-"""LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well. YADE and MercuryDPM are
-told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
+DATA = Format("LAMMPS data (atom style sphere)", "lammps_data.read_data")
+DUMP = Format("LAMMPS dump", "lammps_dump.read_custom_dump", frames=True)
+RESTART = Format("LAMMPS restart", "")
+XYZ = Format("extended XYZ", "xyz.read_xyz", frames=True)
+TABLE = Format("table", "tables.read_table")
+YADE = Format("YADE's text", "tables.read_yade")
+MERCURY = Format("MercuryDPM's data", "tables.read_mercury", frames=True)
+READERS = {
+    ".disks": Format("dumps of the decks", "lammps_dump.read_deck_dump", frames=True),
+    ".xyz": XYZ, ".extxyz": XYZ, ".data": DATA, ".dump": DUMP, ".lammpstrj": DUMP, ".restart": RESTART,
+    ".csv": TABLE, ".txt": TABLE, ".json": Format("packing.json", "tables.read_json"),
+    ".gsd": Format("GSD", "gsd_file.read_gsd", frames=True),
+}  # fmt: skip
+"""Formats by suffix. LAMMPS has none of its own: data.NAME, dump.NAME and restart.NAME are known as well. YADE and
+MercuryDPM are told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
 
-READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
 WRITERS = {
     ".vtp": "vtp.write_vtp", ".xyz": "xyz.write_xyz", ".gsd": "gsd_file.write_gsd", ".data": "lammps_data.write_data",
     ".csv": "tables.write_contacts", ".pvd": "vtp.write_pvd",
@@ -106,18 +91,16 @@ def format_of(path: Path) -> Format:
         words = stream.readline(400).split()
     if words[:1] == ["#format"]:
         return YADE
-    if len(words) in (6, 8) and ".data" in name and all(map(WORD_OF_NUMBER.fullmatch, words)):
+    if len(words) in (6, 8) and ".data" in name and all(re.fullmatch(r"[-+.\deE]+", word) for word in words):
         return MERCURY
-    found = READERS.get(Path(name).suffix)
+    found = READERS.get(Path(name).suffix) or {"data": DATA, "dump": DUMP}.get(name.split(".")[0])
     if found is None and begins_with(path, RESTART_BEGINNING):
-        found = RESTART
-    found = found or {"data": DATA, "dump": DUMP}.get(name.split(".")[0])
+        return RESTART
     if found is None and is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
     if found is None:
-        names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
-        others = "each text also as .gz, run.h5, and LAMMPS decks (.in, in.NAME)"
-        raise PackingFileError(f"{path} is of no format that is read: give {names}, {others}.")
+        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data"
+        raise PackingFileError(f"{path} is of no format that is read: give {names}, run.h5, or a LAMMPS deck (.in).")
     return found
 
 
@@ -127,9 +110,9 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     Parameters
     ----------
     path : Path
-        The file, of a format of `FORMATS`.
+        The file, of a format of `READERS`.
     frame : int, optional
-        Number of the frame; negative numbers count from the last.
+        Number of the frame, by default the last; negative numbers count from the last.
 
     Raises
     ------
@@ -144,7 +127,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     with telling(path, f"is not read as {found.words}"):
-        read: Disks = _function(found.reader)(path, *([frame] if found.frames else []))
+        read: Disks = _function(found.reader)(path, *([-1 if frame is None else frame] if found.frames else []))
     return read
 
 
@@ -169,10 +152,7 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
 
 
 def write_packing(
-    path: Path,
-    packing: Packing | Configuration,
-    modes: Sequence[ModeVectors] = (),
-    values: Mapping[str, Floats] | None = None,
+    path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = (), values: Columns | None = None
 ) -> str:
     """Write a packing for another code.
 
@@ -205,7 +185,8 @@ def write_packing(
     says: str = _function(WRITERS[path.suffix])(path, [(0.0, found)])
     noun = "disk" if packing.dimension == 2 else "sphere"
     what = {noun: len(packing), "contact": len(found.ends), "mode": len(modes)}
-    return "; ".join(each for each in (", ".join(counted(count, noun) for noun, count in what.items()), says) if each)
+    text = ", ".join(counted(count, noun) for noun, count in what.items())
+    return f"{text}; {says}" if says else text
 
 
 def write_frames(path: Path, frames: Iterable[tuple[float, Exported]]) -> None:

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Indices
-from ...counted import counted
 from ...errors import BadInputError, PackingFileError
 from ...packing.contacts import FLOOR, Contacts
-from ...packing.geometry import nearest_image, neighbour_tree, touching
+from ...packing.geometry import nearest_image, touching
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import read_plain_text, telling
@@ -52,24 +51,26 @@ ALIASES = {
 """Other names of columns, of particles and of contacts: those of LAMMPS, of our decks' dumps, of YADE."""
 
 
-def standard_names(columns: Mapping[str, Floats]) -> dict[str, Floats]:
-    """The columns by their standard names; of two with the same meaning the one that has the standard name itself."""
+def standard_names(source: object, columns: Mapping[str, Floats], *needed: str) -> dict[str, Floats]:
+    """The columns by their standard names; of two with the same meaning the one that has the standard name itself.
+
+    Raises PackingFileError if one that is needed is missing.
+    """
     lower = {name.lower(): column for name, column in columns.items()}
     named = {ALIASES[name]: column for name, column in reversed(lower.items()) if name in ALIASES}
-    return named | {name: column for name, column in lower.items() if name not in ALIASES}
+    named |= {name: column for name, column in lower.items() if name not in ALIASES}
+    if "diameter" in named:
+        named.setdefault("radius", 0.5 * named["diameter"])
+    for name in (each for each in needed if each not in named):
+        also, has = " or diameter" if name == "radius" else "", ", ".join(columns) or "none"
+        raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
+    return named
 
 
 class Slips(NamedTuple):
-    """Slips of contacts, by the IDs of their disks.
+    """Slips of contacts, along tau, length, with low parts if there are any, by the IDs of their disks; 0 is the floor.
 
-    Attributes
-    ----------
-    first, second : ndarray of int, shape (C,)
-        IDs; a second ID of 0 is the floor.
-    slip, low : ndarray, shape (C,)
-        Along tau, length; and low parts if there are any.
-    complete : bool
-        Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
+    If they are not `complete`, all touching disks are in contact, and contacts that are not listed have no slip.
     """
 
     first: Indices
@@ -87,33 +88,23 @@ class Disks:
     ----------
     source : str
         The file and the place in it, or another origin of the particles.
-    position : ndarray, shape (N, 2), of spheres (N, 3)
-        Centres, length.
-    radius : ndarray, shape (N,)
-        Radii, length.
-    id : ndarray of int, shape (N,)
-        IDs of the file, or from 1.
-    mass, angle, kind, top, position_low : ndarray or None
-        Mass, orientation, type, whether in the upper layer, low parts of the centres; None if absent.
+    position, position_low : ndarray, shape (N, 2), of spheres (N, 3)
+        Centres, length, and their low parts, if there are any.
+    radius, id, mass, angle, top : ndarray, shape (N,)
+        Radii, length; IDs of the file, of disks from 1; mass, orientation, whether in the upper layer: None if absent.
     box_length : float or None
         Period along x; None if the sides are open.
-    types, groups : mapping
-        Particles of each type by its name, where types have names, and of each group, as booleans.
-    box : ndarray, shape (3, 3), or None
-        Its edges in rows, length; None where the file has none.
-    origin : ndarray, shape (3,)
-        Its lower corner, length.
+    named : mapping of ndarray of bool, each of shape (N,)
+        Members of "type:2", "type:Al" or "group:upper".
+    box, origin : ndarray, shape (3, 3) or None, and shape (3,)
+        Edges of the box in rows, and its lower corner, length; None where the file has none.
     periodic : sequence of bool, or None
         Along each edge; None where the file does not say, and disks are taken as periodic along x.
-    first_id : int
-        Number of the first particle, in a code that counts from 0.
     slips : Slips or None
         None if the file has none.
     given : mapping
         Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
         fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
-    remark : str
-        Information that the format has lost; empty for none.
     """
 
     source: str
@@ -122,19 +113,15 @@ class Disks:
     id: Indices
     mass: Floats | None = None
     angle: Floats | None = None
-    kind: Indices | None = None
     top: NDArray[np.bool_] | None = None
     position_low: Floats | None = None
     box_length: float | None = None
-    types: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    named: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     box: Floats | None = None
     origin: Floats = field(default_factory=lambda: np.zeros(3))
     periodic: Sequence[bool] | None = None
-    first_id: int = 1
     slips: Slips | None = None
     given: Mapping[str, float] = field(default_factory=dict)
-    remark: str = ""
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -143,61 +130,41 @@ class Disks:
         """The disks, shifted so that a floor at another height is at y = 0."""
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
-    @property
-    def slips_known(self) -> bool:
-        """Whether the file gives slips that are known."""
-        return self.slips is not None and bool(self.given.get("slips_known", True))
+
+def places_of(ids: NDArray, known: Indices, source: object, elsewhere: NDArray | bool = False) -> Indices:
+    """Where IDs are among known ones, which are sorted; a PackingFileError for one that is not there, nor elsewhere."""
+    found = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+    for strange in ids[(known[found] != ids) & ~np.broadcast_to(elsewhere, ids.shape)]:
+        raise PackingFileError(f"{source}: a contact names particle {strange:g}, which is not there.")
+    return found
 
 
-def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
-    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
-    wanted, few, many = -1 if frame is None else frame, min(counts, default=0), max(counts, default=0)
-    if frame is None and few < many:
-        raise PackingFileError(f"{path} has frames with {few} and {many} particles: choose one with --frame.")
-    if not -len(counts) <= wanted < len(counts):
-        raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
-    return wanted % len(counts)
+def choose_frame(path: Path, count: int, frame: int) -> int:
+    """The number of the chosen one of some frames, from 0; negative numbers count from the end."""
+    if not -count <= frame < count:
+        raise PackingFileError(f"{path} has {count} frames; there is no --frame {frame}.")
+    return frame % count
 
 
 def particles_of(
     source: object, columns: Mapping[str, Floats], box: Floats | None = None, *, type_names: Sequence[str] = (),
-    first_id: int = 1, **more: Any,
+    first_id: int = 1, groups: Mapping[str, NDArray[np.bool_]] | None = None, **more: Any,
 ) -> Disks:  # fmt: skip
-    """Particles of some columns.
+    """Particles of columns, numbers by name, in any order of the particles.
 
-    Parameters
-    ----------
-    source : str or Path
-        What a sentence about them begins with.
-    columns : mapping of ndarray, each of shape (N,)
-        Numbers by name, in any order of the particles.
-    type_names : sequence of str
-        Of each particle, where types have names.
-    **more
-        Further fields of `Disks`.
-
-    Raises
-    ------
-    PackingFileError
-        If a column is missing, or holds what it cannot hold.
+    `source` begins sentences about them; `type_names` has a name for each particle, `groups` has the members sorted by
+    ID, and `more` further fields of `Disks`. A PackingFileError if a column is missing, or holds what it cannot hold.
     """
-    c = standard_names(columns)
-    if "diameter" in c:
-        c.setdefault("radius", 0.5 * c["diameter"])
-    for name in (each for each in ("x", "y", "radius") if each not in c):
-        has, also = ", ".join(columns) or "none", " or diameter" if name == "radius" else ""
-        raise PackingFileError(f"{source} has no column {name}{also} (its columns: {has}): write it with one.")
+    c = standard_names(source, columns, "x", "y", "radius")
     if not len(c["x"]):
         raise PackingFileError(f"{source} has no particles.")
     ids = c.setdefault("id", np.arange(len(c["x"]), dtype=np.float64) + np.float64(first_id))
     for name, column in c.items():
-        odd, says = ~np.isfinite(column), "which is no number"
-        if name in ("radius", "mass", "density"):
-            odd, says = odd | (column <= 0), "and must be above 0"
-        elif name in ("id", "type"):
-            odd, says = odd | (column != np.rint(column)), "and must be a whole number"
+        positive, whole = name in ("radius", "mass", "density"), name in ("id", "type")
+        odd = ~np.isfinite(column) | (positive & (column <= 0)) | (whole & (column != np.rint(column)))
+        needs = "a number above 0" if positive else "a whole number" if whole else "a number"
         for k in np.flatnonzero(odd):
-            raise PackingFileError(f"{source}: {name} of particle {ids[k]:g} is {column[k]:g}, {says}.")
+            raise PackingFileError(f"{source}: {name} of particle {ids[k]:g} is {column[k]:g}, and must be {needs}.")
     order = np.argsort(ids, kind="stable")
     c = {name: column[order] for name, column in c.items()}
     for twice in c["id"][1:][np.diff(c["id"]) == 0]:
@@ -206,21 +173,21 @@ def particles_of(
         raise PackingFileError(f"{source}: IDs must be {first_id} or more, and one is {c['id'][0]:g}.")
     if "density" in c:
         c.setdefault("mass", mass_of_density(c["density"], c["radius"]))
+    named = {f"type:{kind:g}": c["type"] == kind for kind in np.unique(c.get("type", []))}
     names, sides = np.array(type_names, dtype=object)[order[: len(type_names)]], more.get("periodic")
+    named |= {f"type:{name}": names == name for name in dict.fromkeys(names.tolist())}
+    named |= {f"group:{name}": members for name, members in (groups or {}).items()}
     closes = box is not None and box[0, 0] > 0 and (sides is None or sides[0])
     return Disks(
         str(source), np.column_stack([c[axis] for axis in ("xyz" if "z" in c and np.ptp(c["z"]) else "xy")]),
-        c["radius"], c["id"].astype(np.int64), c.get("mass"), c.get("angle"),
-        kind=c["type"].astype(np.int64) if "type" in c else None,
-        top=c["top"] != 0 if "top" in c else None,
+        c["radius"], c["id"].astype(np.int64), c.get("mass"), c.get("angle"), c["top"] != 0 if "top" in c else None,
         position_low=np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
-        box_length=float(box[0, 0]) if box is not None and closes else None,
-        types={name: names == name for name in dict.fromkeys(names.tolist())}, box=box, first_id=first_id, **more,
+        box_length=float(box[0, 0]) if box is not None and closes else None, named=named, box=box, **more,
     )  # fmt: skip
 
 
 def in_plane(found: Disks) -> Disks:
-    """Particles as disks, with IDs from 1; a PackingFileError if they do not lie in a plane."""
+    """Particles as disks, with IDs from 1, as 0 is the floor; a PackingFileError if they do not lie in a plane."""
     place, box = found.position, found.box
     if place.shape[1] == 3 and np.ptp(place[:, 2]) > FLATNESS * found.radius.min():
         says = f"it is of three dimensions (z goes from {place[:, 2].min():g} to {place[:, 2].max():g}), and is read as"
@@ -228,7 +195,7 @@ def in_plane(found: Disks) -> Disks:
         raise PackingFileError(f"{found.source}: {says} disks in a plane; {cure}.")
     if box is not None and np.count_nonzero(box - np.diag(np.diag(box))):
         raise PackingFileError(f"{found.source} has a tilted box: give one with right angles.")
-    return replace(found, position=place[:, :2].copy(), id=found.id + (1 - found.first_id))  # 0 is the floor
+    return replace(found, position=place[:, :2].copy(), id=found.id + (found.id[0] == 0))
 
 
 def sphere_volume(radius: Floats) -> Floats:
@@ -271,43 +238,39 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
     """
     place, radius, period, source = disks.position, disks.radius, disks.box_length, disks.source
     with telling(source, "describes no possible packing", ValueError):
+        contacts = touching(place, radius, period)
         for k in np.flatnonzero(place[:, 1] <= 0):
             says = f"disk {disks.id[k]} is at y = {place[k, 1]:g}, below the floor at 0"
             raise PackingFileError(f"{source}: {says}: say with --floor at which y it is.")
-        pairs = neighbour_tree(place, period).query_pairs(float(radius.max()), output_type="ndarray")
-        distance = np.hypot(*nearest_image(place[pairs[:, 0]] - place[pairs[:, 1]], period).T)
-        for k in np.flatnonzero(distance < np.maximum(*radius[pairs].T)):
-            says = f"disks {disks.id[pairs[k, 0]]} and {disks.id[pairs[k, 1]]} are {distance[k]:g} apart"
+        i, j = contacts.i[~contacts.floor], contacts.j[~contacts.floor]
+        distance = np.hypot(*nearest_image(place[i] - place[j], period).T)
+        for k in np.flatnonzero(distance < np.maximum(radius[i], radius[j])):
+            says = f"disks {disks.id[i[k]]} and {disks.id[j[k]]} are {distance[k]:g} apart"
             raise PackingFileError(f"{source}: {says}, the centre of one in the other: separate them.")
-        contacts = touching(place, radius, period)
         if disks.slips is not None and law.frictional:
             contacts = _slipped(contacts, disks, disks.slips)
-        known = disks.slips_known or not law.frictional or len(contacts) == 0
+        known = disks.slips is not None and bool(disks.given.get("slips_known", True))
         given: dict[str, Any] = {name: getattr(disks, name) for name in ("radius", "angle", "mass", "position_low")}
-        given |= {"slips_known": known, "box_length": period}
+        given |= {"slips_known": known or not law.frictional or len(contacts) == 0, "box_length": period}
         return Packing(position=place, contacts=contacts, law=law, top=top, **(given | load))
 
 
 def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     """Contacts with the slips of the file, of which disks that do not touch may have none."""
     ids = np.array([slips.first, slips.second])
-    ends = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
-    for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
-        raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
-    ends[ids == 0] = FLOOR
+    ends = np.where(ids == 0, FLOOR, places_of(ids, disks.id, disks.source, ids == 0))
     i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
     listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
         return listed
-    slip = dict(zip(zip(listed.i.tolist(), listed.j.tolist(), strict=True), listed.slip.tolist(), strict=True))
-    known = [slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]
-    lost = [(disks.id[i], disks.id[j] if j >= 0 else "the floor") for (i, j), size in slip.items() if size]
-    if lost:
-        says = (
-            f"{counted(len(lost), 'slip')} of disks that do not touch, such as those of {lost[0][0]} and {lost[0][1]}"
-        )
-        raise PackingFileError(f"{disks.source}: {says}: leave such rows out, or give places and radii that touch.")
-    return near.slipped(np.array(known))
+    slip = {(i, j): s for i, j, s in zip(*(each.tolist() for each in (listed.i, listed.j, listed.slip)), strict=True)}
+    found = near.slipped(np.array([slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]))
+    for (i, j), size in slip.items():
+        if size:
+            both = f"{disks.id[i]} and {disks.id[j] if j >= 0 else 'the floor'}"
+            says = f"{both} have a slip and do not touch: leave such rows out, or give places and radii that touch"
+            raise PackingFileError(f"{disks.source}: {says}.")
+    return found
 
 
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
@@ -332,12 +295,13 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
     BadInputError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
+    y = disks.position[:, 1]
     if says is None and disks.top is None:
         add = f"add {key.rstrip(' =')}, {LAYER_WAYS}"
         raise BadInputError(f"{disks.source} does not say which disks are the upper layer: {add}.")
-    layer, y = "its own column top" if says is None else f"{key}{says}", disks.position[:, 1]
+    layer = "its own column top" if says is None else f"{key}{says}"
     try:
-        chosen = disks.top if says is None else _layer_of(disks, str(says).strip())
+        chosen = _layer_of(disks, str(says).strip()) if says is not None else disks.top
     except (OSError, ValueError) as error:
         raise BadInputError(f"{layer}: {error}.") from None
     if chosen is None or not chosen.any():
@@ -348,36 +312,32 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
     """The layer that a text names; a ValueError or an OSError says why it is none."""
     kind, _, value = text.partition(":")
-    (x, y), radius = disks.position.T, disks.radius
+    values = {"x": disks.position[:, 0], "y": disks.position[:, 1], "radius": disks.radius}
+    chosen = np.zeros(len(disks), dtype=np.bool_)
     if text.isdecimal():
         if int(text) > len(disks):
             raise ValueError(f"{disks.source} has {len(disks)} disks alone")
         with telling(disks.source, "describes no possible packing", ValueError):
-            contacts = touching(disks.position, radius, disks.box_length)
-        order = np.argsort(-y, kind="stable")
-        held = np.isin(order, [contacts.i, contacts.j])
-        enough = held.sum() >= max(int(text), LEAST_TOUCHING_SHARE * len(disks))
-        return np.isin(np.arange(len(disks)), (order[held] if enough else order)[: int(text)])
-    if kind in ("type", "group") and value:
-        known = dict(disks.types if kind == "type" else disks.groups)
-        if kind == "type" and disks.kind is not None:
-            known = {str(number): disks.kind == number for number in np.unique(disks.kind).tolist()} | known
-        if value not in known:
-            raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {', '.join(known) or 'none'})")
-        return known[value]
-    if kind == "ids" and value:
-        chosen = np.zeros(len(disks), dtype=np.bool_)
+            contacts = touching(disks.position, disks.radius, disks.box_length)
+        order = np.argsort(-values["y"], kind="stable")
+        held = order[np.isin(order, [contacts.i, contacts.j])]
+        enough = len(held) >= max(int(text), LEAST_TOUCHING_SHARE * len(disks))
+        chosen[(held if enough else order)[: int(text)]] = True
+    elif kind in ("type", "group") and value:
+        if text not in disks.named:
+            has = ", ".join(each[len(kind) + 1 :] for each in disks.named if each.startswith(kind)) or "none"
+            raise ValueError(f"{disks.source} has no {kind} {value} (its {kind}s: {has})")
+        chosen = disks.named[text]
+    elif kind == "ids" and value:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
-            if not re.fullmatch(r"\d+(-\d+)?", part):
-                raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            first, last = map(int, (part.split("-") * 2)[:2])
-            within = (first <= disks.id) & (disks.id <= last)
-            if within.sum() <= last - first:
+            first, _, last = part.partition("-")
+            within = (int(first) <= disks.id) & (disks.id <= int(last or first))
+            if within.sum() <= int(last or first) - int(first):
                 raise ValueError(f"{disks.source} has no disk {part}")
             chosen |= within
-        return chosen
-    parts = [REGION.fullmatch(part) for part in text.split(" and ")]
-    if None in parts:
-        raise ValueError(f"it is none of {LAYER_WAYS}")
-    values = {"x": x, "y": y, "radius": radius}
-    return np.all([OPERATORS[each[2]](values[each[1]], float(each[3])) for each in parts if each], axis=0)
+    else:
+        parts = [REGION.fullmatch(part) for part in text.split(" and ")]
+        if None in parts:
+            raise ValueError(f"it is none of {LAYER_WAYS}")
+        chosen = np.all([OPERATORS[each[2]](values[each[1]], float(each[3])) for each in parts if each], axis=0)
+    return chosen

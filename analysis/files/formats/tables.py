@@ -1,7 +1,7 @@
 """Text of numbers: tables made by hand, packing.json, and the text files of YADE and MercuryDPM; lines, words, frames.
 
-**CSV**: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a contact. Heads may have
-units, as in ``x [mm]``. A packing has no units of its own, and nothing is converted: lengths in two units are refused.
+**CSV**: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a contact. A packing has
+no units of its own, and nothing is converted: names with a unit are refused.
 
 **YADE**, from yade.export.textExt: a line with the names of the columns, joined by underscores, and one line for each
 sphere. YADE's own export has six digits, so that overlaps are rounded.
@@ -17,7 +17,6 @@ periodic: x is assumed periodic with the width of the bounds, as for LAMMPS data
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import re
@@ -30,24 +29,12 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import BadInputError, PackingFileError
 from ..atomic_write import open_text, telling, write_text
-from .disks import ALIASES, Disks, Slips, choose_frame, particles_of, standard_names
+from .disks import Disks, Slips, choose_frame, particles_of, standard_names
 from .exported import Exported
-from .lammps_dump import dump_frames
+from .lammps_dump import snapshot
 
 NUMBER_WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 """Words that stand for numbers."""
-
-HEADS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
-"""Names of columns with blanks between them, each with its unit in brackets, if there is one."""
-
-DECIMAL_COMMA = re.compile(r"^(\s*[-+]?\d*),(\d*(?:[eE][-+]?\d+)?\s*)$")
-
-LENGTHS = "x", "y", "z", "radius", "diameter"
-WITHOUT_UNIT = {"angle", "density", "slip"}
-"""Columns whose unit follows from others, or is the radian."""
-
-SIX_DIGITS = 7
-"""Longest mantissa that YADE's %g writes, with its point."""
 
 MERCURY_ROWS = {
     8: ["x", "y", None, None, "radius", None, None, "type"],
@@ -88,16 +75,9 @@ def strip_comments(lines: Iterable[str], first: int) -> Iterator[tuple[int, list
 def columns_of(
     path: Path, lines: Iterable[tuple[int, list[str]]], names: Sequence[str | None], wanted: str, *, more: bool = True
 ) -> dict[str, Floats]:
-    """The columns of some lines, their numbers and words, by name.
+    """The columns of some lines, their numbers and words, by name; a column whose name is None is skipped.
 
-    Parameters
-    ----------
-    names : sequence of str or None
-        Names of the columns; None for one that is skipped.
-    wanted : str
-        What was wanted, for a line of another length.
-    more : bool
-        Whether a line may have more columns than there are names.
+    `wanted` is said of a line of another length; with `more`, a line may have more columns than there are names.
     """
     kept, rows = [k for k, name in enumerate(names) if name is not None], []
     for number, words in lines:
@@ -107,18 +87,15 @@ def columns_of(
     return {str(names[k]): column for k, column in zip(kept, np.array(rows).reshape(-1, len(kept)).T, strict=True)}
 
 
-def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -> tuple[int, int]:
-    """First line of a frame and its number of particles, in a file of consecutive frames.
-
-    A frame begins with its number of particles; they follow after `head` lines. `frame` is as of `choose_frame`.
-    """
+def block_of_frame(path: Path, lines: list[str], head: int, frame: int) -> tuple[int, int]:
+    """First line of a frame and its number of particles, which follow after `head` lines, in a file of frames."""
     counts, at, end = dict[int, int](), 0, len("\n".join(lines).rstrip().split("\n"))
     while at < end:
         counts[at] = int(lines[at].split()[0])
         at += head + counts[at]
     if not counts or at > len(lines):
         raise PackingFileError(f"{path} is no complete file of frames: it breaks off.")
-    begin = list(counts)[choose_frame(path, list(counts.values()), frame)]
+    begin = list(counts)[choose_frame(path, len(counts), frame)]
     return begin, counts[begin]
 
 
@@ -133,57 +110,35 @@ def _table(path: Path) -> dict[str, Floats]:
     Comments (lines that begin with # or //) may stand anywhere. If numbers follow the first of them at once, the last
     comment before them has the names.
     """
-    rows = [(number, line.strip()) for number, line in enumerate(lines_of(path), 1) if line.strip()]
-    body = [row for row in rows if not row[1].startswith(("#", "//"))]
-    first = rows.index(body[0]) if body else 0
-    named = first and re.match(r"[-+.,\d]", body[0][1])  # in a comment before the numbers
-    head, body = (rows[first - 1][1].lstrip("#/"), body) if named else ("".join(row[1] for row in body[:1]), body[1:])
-    if not body:
+    lines = [(number, line.strip()) for number, line in enumerate(lines_of(path), 1) if line.strip()]
+    body = [row for row in lines if not row[1].startswith(("#", "//"))]
+    first = lines.index(body[0]) if body else 0
+    if first and re.match(r"[-+.,\d]", body[0][1]):
+        body.insert(0, (0, lines[first - 1][1].lstrip("#/")))
+    if len(body) < 2:
         raise PackingFileError(f"{path} is no table: give a line of names, as x,y,radius, and lines of numbers.")
-    mark = next((each for each in ";,\t" if each in head), None)
-    words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in body]
-    if mark != ",":
-        words = [(number, [DECIMAL_COMMA.sub(r"\1.\2", word) for word in each]) for number, each in words]
-    heads = [re.split(r"[\[(]", each) for each in (head.split(mark) if mark else HEADS.findall(head))]
-    names = [name.strip(' "').lower() for name, *_ in heads]
-    units = {ALIASES.get(name, name): unit.strip(' ])"') for name, (_, *has) in zip(names, heads, strict=True)
-             for unit in has if unit.strip(' ])"') not in ("", "-", "1")}  # fmt: skip
-    columns = standard_names(columns_of(path, words, names, f"the first {len(names)}", more=False))
-    lengths = {name: units.get(name, "no unit") for name in LENGTHS if name in columns}
-    if len(set(lengths.values())) > 1 or units.keys() & columns.keys() & WITHOUT_UNIT:
-        says = ", ".join(f"{name} has {unit}" for name, unit in (units | lengths).items() if name in columns)
-        cure = "give all lengths in one unit, angles in radians, and densities and slips in the unit of the lengths"
-        raise PackingFileError(f"{path}: nothing is converted, and {says}: {cure}, without a unit in their head.")
-    return columns
+    mark = next((each for each in ";,\t" if each in body[0][1]), None)
+    (_, names), *rows = [(number, [word.strip(' "') for word in line.split(mark)]) for number, line in body]
+    for unit in (name for name in names if "[" in name or "(" in name):
+        cure = "give all lengths in one unit, angles in radians, and leave units out of the line of names"
+        raise PackingFileError(f"{path}: nothing is converted, and the names have a unit, {unit}: {cure}.")
+    if mark != ",":  # decimals may have a comma
+        rows = [(number, [word.replace(",", ".") for word in words]) for number, words in rows]
+    return columns_of(path, rows, [name.lower() for name in names], f"the first {len(names)}", more=False)
 
 
 def contact_columns(path: Path, *needed: str, frame: int = -1, names: Sequence[str] | None = None) -> dict[str, Floats]:
-    """The columns of a table of contacts, in CSV or as a LAMMPS dump local, by standard names.
+    """The columns of a table of contacts, in CSV or a frame of a LAMMPS dump local, by standard names.
 
-    Parameters
-    ----------
-    *needed : str
-        Columns that must be there.
-    frame : int
-        Of a dump.
-    names : sequence of str, optional
-        Names of the columns, in place of those of the file.
+    `needed` must be there; `names` stand in place of those of the file.
     """
-    if next(iter(lines_of(path)), "").startswith("ITEM:"):
-        frames = list(dump_frames(path))
-        shown = frames[choose_frame(path, [0] * len(frames), frame)]
-        columns = dict(zip(shown.columns, shown.rows.T, strict=True))
-    else:
-        columns = _table(path)
+    of_lammps = next(iter(lines_of(path)), "").startswith("ITEM:")
+    columns = snapshot(path, frame).by_name if of_lammps else _table(path)
     if names is not None:
         if len(names) != len(columns):
             raise BadInputError(f"--columns names {len(names)} columns, and {path} has {len(columns)}.")
         columns = dict(zip(names, columns.values(), strict=True))
-    columns = standard_names(columns)
-    for name in (each for each in needed if each not in columns):
-        has = ", ".join(columns)
-        raise PackingFileError(f"{path} has no column {name} (its columns: {has}; --columns names those of a dump).")
-    return columns
+    return standard_names(f"{path} (--columns names those of a dump)", columns, *needed)
 
 
 def read_slips(path: Path) -> Slips:
@@ -210,18 +165,15 @@ def read_json(path: Path) -> Disks:
     """
     data = json.loads("\n".join(lines_of(path)))
     x, y, radius = np.array([data[name] for name in ("x", "y", "radius")], dtype=np.float64)
-    columns, disks = {"x": x, "y": y, "radius": radius}, len(x)
+    columns, top = {"x": x, "y": y, "radius": radius}, np.zeros(len(x))
     if data.get("mass") is not None:
-        columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), disks)
-    top, period = np.asarray(data.get("top", [])), data.get("box_length")
-    if top.dtype != np.bool_ or top.shape != (disks,):
-        if top.size and (not np.issubdtype(top.dtype, np.integer) or top.min() < 0 or top.max() >= disks):
-            raise ValueError("top must hold indices of disks, counted from 0, or true and false for each disk")
-        top = np.isin(np.arange(disks), top)
+        columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), len(x))
+    with telling(path, "has a wrong top, which holds indices of disks from 0, or true and false", IndexError):
+        top[data.get("top") or []] = 1.0
     if top.any():
-        columns["top"] = top.astype(np.float64)
-    box, none = None if period is None else np.diag([float(period), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
-    return particles_of(path, columns, box, slips=Slips(none, none, np.zeros(0)))
+        columns["top"] = top
+    box, none = np.diag([float(data.get("box_length") or 0.0), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
+    return particles_of(path, columns, box if box[0, 0] else None, slips=Slips(none, none, np.zeros(0)))
 
 
 def read_yade(path: Path) -> Disks:
@@ -230,15 +182,12 @@ def read_yade(path: Path) -> Disks:
     names = head.split()[-1].partition("_attrs")[0].split("_")  # attributes are of any number, at the end
     if not {"x", "y", "z", "r"} <= set(names):
         raise PackingFileError(f"{path}, line 1: {head!r} names no columns x, y, z and r: export x_y_z_r from YADE.")
-    rows = list(strip_comments(lines, 2))
-    columns = columns_of(path, rows, names, f"line 1 announces {len(names)}")
-    short = all(len(word.lstrip("-0.").partition("e")[0]) <= SIX_DIGITS for _, words in rows for word in words[:4])
-    remark = "its numbers have six digits, as YADE writes them: overlaps are lost below that" if short else ""
-    return particles_of(path, columns, first_id=0, remark=remark)
+    columns = columns_of(path, strip_comments(lines, 2), names, f"line 1 announces {len(names)}")
+    return particles_of(path, columns, first_id=0)
 
 
-def read_mercury(path: Path, frame: int | None = None) -> Disks:
-    """Particles at one time, counted from 0; the last one by default, if all times have as many particles."""
+def read_mercury(path: Path, frame: int) -> Disks:
+    """Particles at one time, counted from 0."""
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 1, frame)
     low, high = np.array(numbers_in(lines[begin], f"{path}, line {begin + 1}")[2:]).reshape(2, -1)

@@ -174,8 +174,6 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         reads = "read_restart" if format_of(file) is RESTART else "units lj, atom_style sphere and read_data"
         says = f"For spheres, or another law, write a deck with {reads} {file.name}, its laws, its walls and a run,"
         raise type(error)(f"{error} {says} and give it to faultgouge import.") from error
-    if disks.remark:
-        say(f"{file}: {disks.remark}")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
