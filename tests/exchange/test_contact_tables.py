@@ -163,11 +163,3 @@ def test_spheres_come_from_any_format_with_radii(live, tmp_path, suffix):
     np.testing.assert_array_equal(found.radius, packing.radius[order])
     np.testing.assert_allclose(found.mass, packing.mass[order], rtol=1e-15)
     np.testing.assert_allclose(found.box, packing.box, rtol=1e-15)
-
-
-@pytest.mark.parametrize("head", ["# two spheres\n# of a laboratory\nx,y,z,radius\n", "#x y z radius\n"])
-def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path, head):
-    """As in the example disks.csv; the names of YADE stand in a comment themselves."""
-    rows = "0,0,0,0.5\n0.99,0,0,0.5\n"
-    (tmp_path / "told.csv").write_text(head + (rows if "," in head else rows.replace(",", " ")))
-    assert read_particles(tmp_path / "told.csv").position.tolist() == [[0, 0], [0.99, 0]]

@@ -21,5 +21,7 @@ def test_to_the_bit(d, tmp_path):
 
 def test_a_snapshot_is_no_run(tmp_path):
     write_configuration(tmp_path / "run.h5", make(2))
-    with pytest.raises(PackingFileError, match="no run of ours: of a packing as LAMMPS left it, spectrum and draw tell"):
+    with pytest.raises(
+        PackingFileError, match="no run of ours: of a packing as LAMMPS left it, spectrum and draw tell"
+    ):
         RunFile(tmp_path / "run.h5")
