@@ -77,14 +77,9 @@ def is_hdf5(path: Path) -> bool:
 
 
 def format_of(path: Path) -> Format:
-    """Find the format of a file by its first line, its suffix, or its prefix for LAMMPS files.
+    """The format of a file, by its first line, its suffix, or its prefix for LAMMPS files.
 
-    Raises
-    ------
-    PackingFileError
-        If no reader knows the format.
-    OSError
-        If the file cannot be read.
+    Raises PackingFileError if no reader knows it, OSError if the file cannot be read.
     """
     words, name = list[str](), path.name.lower().removesuffix(".gz")
     with suppress(OSError, UnicodeDecodeError, EOFError, zlib.error), open_text(path) as stream:
@@ -105,19 +100,9 @@ def format_of(path: Path) -> Format:
 
 
 def read_particles(path: Path, frame: int | None = None) -> Disks:
-    """Read the particles in a file of another code, disks or spheres.
+    """Read the particles in a file of another code, disks or spheres, of the frame of a number, by default the last.
 
-    Parameters
-    ----------
-    path : Path
-        The file, of a format of `READERS`.
-    frame : int, optional
-        Number of the frame, by default the last; negative numbers count from the last.
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, has no known format, is a restart, or has no particles.
+    Raises PackingFileError if the file is missing, has no known format, is a restart, or has no particles.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
@@ -154,30 +139,11 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
 def write_packing(
     path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = (), values: Columns | None = None
 ) -> str:
-    """Write a packing for another code.
+    """Write a packing for another code, with modes, and with further columns of the particles (.vtp, .xyz, .gsd).
 
-    Parameters
-    ----------
-    path : Path
-        The file; its suffix is the format.
-    packing : Packing or Configuration
-        The packing.
-    modes : sequence of ModeVectors
-        Modes to write with the packing.
-    values : mapping of ndarray, each of shape (N,), optional
-        Further columns of the particles, by name; for .vtp, .xyz and .gsd.
-
-    Returns
-    -------
-    str
-        Description of the contents, and of what the format cannot store.
-
-    Raises
-    ------
-    BadInputError
-        If the suffix is none of an export, or the format has no modes.
-    OutputError
-        If the file cannot be written.
+    The suffix is the format. Returned are, in words, the contents, and what the format cannot store. Raises
+    BadInputError if the suffix is none of an export, or the format has no modes; OutputError if the file cannot be
+    written.
     """
     check_writer(path, bool(modes))
     found = exported(packing, modes)
@@ -192,12 +158,7 @@ def write_packing(
 def write_frames(path: Path, frames: Iterable[tuple[float, Exported]]) -> None:
     """Write the frames of a ramp or of an undamped run (`frames_of`) for another code; the suffix is the format.
 
-    Raises
-    ------
-    BadInputError
-        If the suffix is not in `FILMS`.
-    OutputError
-        If the file cannot be written.
+    Raises BadInputError if it is not in `FILMS`, OutputError if the file cannot be written.
     """
     check_writer(path, frames=True)
     _function(WRITERS[path.suffix])(path, frames)
