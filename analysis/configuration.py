@@ -50,10 +50,8 @@ from .errors import BadInputError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-UNKNOWN_SLIPS = (
-    "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import "
-    "--contacts` takes slips)"
-)
+UNKNOWN_SLIPS = "the tangential forces were not given, and the slips began at zero: K depends on both"
+UNKNOWN_SLIPS += " (`faultgouge import --contacts` takes slips)"
 """Why no verdict is possible where slips are not known."""
 
 
@@ -196,11 +194,10 @@ class Configuration(EqualToTheBit):
             state += f", forces on {sided} one-sided" if len(self.one_sided_particles) else ""
         elif self.contacts.sliding.any() or self.contacts.one_sided.any():
             state += f", {'sliding' if self.contacts.sliding.any() else 'sticking'} in K"
-        return (
-            f"<Configuration: {self._particles}, {counted(len(c) - walls, 'contact')} between them and {state}, "
-            f"{counted(len(self.rattlers), 'rattler')}, residual {self.residual:.3g}, "
-            f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
-        )
+        pairs = counted(len(c) - walls, "contact")
+        proof = "not proved" if self.proof is None else f"proof {self.proof:.1g}"
+        rest = f"{counted(len(self.rattlers), 'rattler')}, residual {self.residual:.3g}, {proof}"
+        return f"<Configuration: {self._particles}, {pairs} between them and {state}, {rest}>"
 
     def __len__(self) -> int:
         return len(self.radius)

@@ -14,11 +14,8 @@ def names_on_use(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
 
     A type checker reads these imports as they stand, and Python makes each of them when its name is used.
     """
-    [block] = [
-        each
-        for each in ast.parse(Path(file).read_text(encoding="utf-8")).body
-        if isinstance(each, ast.If) and ast.unparse(each.test) == "TYPE_CHECKING"
-    ]
+    tests = (each for each in ast.parse(Path(file).read_text(encoding="utf-8")).body if isinstance(each, ast.If))
+    block = next(each for each in tests if ast.unparse(each.test) == "TYPE_CHECKING")
     imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
     module_of = {alias.name: "." * each.level + (each.module or "") for each in imports for alias in each.names}
 

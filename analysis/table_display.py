@@ -11,10 +11,8 @@ class TableDisplay:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
-        body = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
-            for name, value in self._rows().items()
-        )
+        rows = ((html.escape(name), html.escape(value)) for name, value in self._rows().items())
+        body = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{value}</td></tr>" for name, value in rows)
         return f"<table><caption>{html.escape(repr(self).strip('<>'))}</caption>{body}</table>"
 
 

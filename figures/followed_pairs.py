@@ -63,9 +63,7 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
         modes = Motions.of(System.of(packing))
         values.append(modes.with_conjugates()[0])
         slide = int(packing.configuration.contacts.one_sided.sum()) if len(packings) > 1 else 0
-        reasons = (
-            [f"{counted(slide, 'contact')} at Coulomb's bound may slide on, which {NOT_FOLLOWED}"] if slide else []
-        )
+        reasons = [f"{counted(slide, 'contact')} at Coulomb's bound may slide on, which {NOT_FOLLOWED}"][: bool(slide)]
         bearing = force_bearing(packing)
         verdicts.append(stability(bearing, spectrum_of_stiffness=_spectrum_of(bearing, modes), reasons=reasons))
         if 32.0 * modes.right.size * (len(kept) + 1) <= MEMORY:  # right and left vectors

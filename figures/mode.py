@@ -82,9 +82,8 @@ class ModeShape(NamedTuple):
         """The same for a caption."""
         sign = rf" \pm {abs(self.eigenvalue.imag):.4g}\,i" if self.is_complex else ""
         ratios = f"participation ratio {self.participation:.2f}, rotation {100 * self.rotation:.0f} %"
-        return (
-            rf"mode {self.number}: $\lambda = {self.eigenvalue.real:.6g}{sign}$" + f"\n{ratios} of the kinetic energy"
-        )
+        value = rf"$\lambda = {self.eigenvalue.real:.6g}{sign}$"
+        return f"mode {self.number}: {value}\n{ratios} of the kinetic energy"
 
 
 def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:

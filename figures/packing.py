@@ -221,10 +221,9 @@ def _add_keys(axes: Axes, packing: HasConfiguration, chains: LineCollection, col
     if largest:
         unit = 10.0 ** np.floor(np.log10(largest))
         values = [part * unit for part in (0.5, 1, 2, 5) if part * unit <= largest]
-        bars = [
-            Line2D([], [], color=INK, linewidth=widest * value / largest, label=f"${'f_n = ' * (not k)}{value:g}$")
-            for k, value in enumerate(values)
-        ]
+        names = [f"${'f_n = ' * (not k)}{value:g}$" for k, value in enumerate(values)]
+        widths = [widest * value / largest for value in values]
+        bars = [Line2D([], [], color=INK, linewidth=w, label=name) for w, name in zip(widths, names, strict=True)]
         entries = [*([] if flat else patches), *bars]
         figure.legend(handles=entries, loc="outside lower center", ncols=len(entries), columnspacing=1.2)
 

@@ -11,7 +11,7 @@ FAULTGOUGE_DISPATCH
 int compensated_contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law,
                                double dt, Features features, const Grids &grids)
 {
-  return with_law<Compensated>(pairs, disks, box, law, dt, features, grids);
+  return all_forces<Compensated>(pairs, disks, box, law, dt, features, grids);
 }
 
 FAULTGOUGE_DISPATCH

@@ -37,7 +37,7 @@ FAULTGOUGE_DISPATCH
 int contact_forces(ContactPairs &pairs, const Disks &disks, const Period &box, const MindlinLaw &law, double dt,
                    Features features)
 {
-  return with_law<double>(pairs, disks, box, law, dt, features, Grids{});
+  return all_forces<double>(pairs, disks, box, law, dt, features, Grids{});
 }
 
 FAULTGOUGE_DISPATCH

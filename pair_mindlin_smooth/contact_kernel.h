@@ -110,7 +110,7 @@ struct Grids {
   SummationGrid force, tangential;
 };
 
-// What is compiled into a run
+// What a run has
 struct Features {
   bool friction;
   bool advance;    // slips advance by v dt and omega dt

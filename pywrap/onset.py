@@ -153,10 +153,8 @@ def onset_run(
                 failure: Any = NoGrowthError if undamped else OnsetError
                 raise failure(error.finding, "raise ramp.until", error.finer, **damped_alone) from error
             what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
-            finding = (
-                f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
-                "flows before an onset"
-            )
+            finding = f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond"
+            finding += ": the packing flows before an onset"
             raise (NoGrowthError if undamped else NoEquilibriumError)(finding, **damped_alone) from error
         equilibria, near = tuple(path.equilibria), [] if near_onset is None else (found.fx_c + near_onset).tolist()
         between = {fx: path(fx) for fx in near if 0 <= fx <= equilibria[-1].fx}
@@ -199,7 +197,5 @@ def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> floa
     weakened = onset_for(mu * scene.friction.mu_ss).fx_c
     if weakened < first.fx_onset:
         return 0.5 * (weakened + first.fx_onset)
-    raise SceneError(
-        f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the weakened "
-        f"friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
-    )
+    two = f"F_x^c = {weakened:.6g} with the weakened friction does not lie below F_x^c = {first.fx_onset:.6g}"
+    raise SceneError(f"perturb.fx is missing, and there is no load between two onsets: {two}. Give perturb.fx")

@@ -184,10 +184,8 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
     with RunFile(path) as file:
         settings = drive_of(file)
         if settings is None:
-            raise SceneError(
-                f"{path} is not a file of `faultgouge drive`: give such a file for the eigenvalues along its cycles, "
-                "or a scene for those along a ramp"
-            )
+            cure = "give such a file for the eigenvalues along its cycles, or a scene for those along a ramp"
+            raise SceneError(f"{path} is not a file of `faultgouge drive`: {cure}")
         if settings.spring == "rigid":
             raise SceneError(f"{path} is of a rigid drive, whose layer has no spring and no slips: draw with a spring")
         make_folder(output, "cycle.json")

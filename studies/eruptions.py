@@ -316,10 +316,9 @@ def eruptions(scene: Scene, work: Work) -> Result:
         starts = [each for each in starts if not known(each[0].fx, each[0].damped)]
         for found in work.progress(work.map_rows(erupt, starts), len(starts)):
             rows.append(longest=settings.time, **found)
-            work.say(
-                f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
-                f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
-            )
+            size = f"D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}"
+            ends = f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
+            work.say(f"F_x = {found['fx']:g}: {size}, {ends}")
     runs, left_out = _runs(rows, settings), ("scene", "version", "series", "longest")
     if not runs:
         raise NoEquilibriumError(f"the packing bears none of the loads: it flows beyond F_x = {flows_beyond:g}")

@@ -193,13 +193,9 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
 def load_row(packing: Packing) -> dict[str, Any]:
     """The numbers of one load of the task "modes"."""
     found = count_pairs(packing)
-    row = found.as_dict() | {
-        "modes": found.modes,
-        "contacts": len(packing.contacts),
-        "sliding": int(np.count_nonzero(packing.sliding)),
-        "rattlers": len(packing.rattlers),
-        "bound": antisymmetric_norm(packing),
-    }
+    row = found.as_dict() | {"modes": found.modes, "contacts": len(packing.contacts)}
+    row |= {"sliding": int(np.count_nonzero(packing.sliding)), "rattlers": len(packing.rattlers)}
+    row |= {"bound": antisymmetric_norm(packing)}
     if len(found.omega):
         value = found.omega[0] ** 2
         pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)
@@ -282,10 +278,9 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
     says += [f"the first that failed: {row['says']}" for row in failed[:1]]
     if short := [row["result"] for row in good if row["result"]["ends"] != "until"]:
         why = "an eigenvalue is negative" if short[0]["ends"] == "turning point" else "there is no equilibrium"
-        says.append(
-            f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
-            f"of them goes to F_x = {short[0]['reach']:g}, and {why} at the next load"
-        )
+        first_of = f"the first of them goes to F_x = {short[0]['reach']:g}, and {why} at the next load"
+        left_out = "packings whose branch ends before the last load, so that loads are left out"
+        says.append(f"{left_out}: {len(short)}; {first_of}")
     return says
 
 

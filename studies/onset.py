@@ -108,11 +108,6 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
     around = values[max(0, rank - 5) : rank + 7]
     share = np.sum((eigh(0.5 * (dense + dense.T))[1].T @ np.linalg.qr(near.right.real[active])[0]) ** 2, axis=1)
     ancestors = np.sort(np.argsort(share)[-2:])
-    return row | {
-        "modes": len(values),
-        "rank": rank,
-        "spacing": float((around[-1] - around[0]) / (len(around) - 1)),
-        "largest": float(values[-1]),
-        "ancestors": ancestors.tolist(),
-        "ancestry": float(0.5 * share[ancestors].sum()),
-    }
+    row |= {"modes": len(values), "rank": rank, "spacing": float((around[-1] - around[0]) / (len(around) - 1))}
+    row |= {"largest": float(values[-1]), "ancestors": ancestors.tolist()}
+    return row | {"ancestry": float(0.5 * share[ancestors].sum())}

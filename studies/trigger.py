@@ -93,10 +93,8 @@ def threshold(scene: Scene) -> float:
     require_section(scene.ramp, "ramp")
     v0 = require_section(scene.friction, "friction").v0
     if isinstance(v0, str) or v0 == 0:
-        raise SceneError(
-            f"friction.v0 = {v0!r} gives no threshold to exceed, since the velocity of a run that nobody perturbs is "
-            "rounding noise: give a velocity above 0"
-        )
+        why = "since the velocity of a run that nobody perturbs is rounding noise: give a velocity above 0"
+        raise SceneError(f"friction.v0 = {v0!r} gives no threshold to exceed, {why}")
     return v0
 
 
@@ -162,10 +160,8 @@ def bisect_amplitude(wave: Wave) -> Row:
     if reached is None:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {omega:g}: lower friction.v0")
     if not holds:
-        raise SceneError(
-            f"at F_x = {packing.fx:.6g} the layer exceeds v_0 = {v0:g} without a wave, by rounding noise, so that "
-            "no amplitude is critical: raise friction.v0"
-        )
+        noise = "without a wave, by rounding noise, so that no amplitude is critical: raise friction.v0"
+        raise SceneError(f"at F_x = {packing.fx:.6g} the layer exceeds v_0 = {v0:g} {noise}")
     known = {key: expected[key] for key in ("fx", "distance", "omega")}
     return known | {"below": below, "above": above, "runs": runs, "reached": reached}
 
@@ -240,15 +236,14 @@ def trigger(scene: Scene, work: Work) -> Result:
         omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
     waves, table = list[Wave](), list[Row]()
     for k, (distance, packing) in enumerate(packings.items()):
-        row = (
-            rows.find(kind="predicted", distance=distance)
-            or rows.append(kind="predicted", distance=distance, found=predictions(scene, packing, distance, omegas))
-        )["found"]
+        known = rows.find(kind="predicted", distance=distance)
+        row = known["found"] if known else predictions(scene, packing, distance, omegas)
+        if known is None:
+            rows.append(kind="predicted", distance=distance, found=row)
         table += row
         least = min(row, key=lambda each: each["predicted"])
-        work.say(
-            f"at 1 - F_x/F_x^c = {distance:g}: a_c is least, {least['predicted']:.3g}, at omega = {least['omega']:.4g}"
-        )
+        place = f"a_c is least, {least['predicted']:.3g}, at omega = {least['omega']:.4g}"
+        work.say(f"at 1 - F_x/F_x^c = {distance:g}: {place}")
         # the runs are spread evenly; from row to row the places move on by a part of their own distance, so that all
         # frequencies have their turn
         count = given.runs // len(packings) + (k < given.runs % len(packings))
@@ -277,8 +272,5 @@ def trigger(scene: Scene, work: Work) -> Result:
             row |= {"frequency_Hz": real.frequency(row["omega"]), "ground_velocity_m_per_s": velocity}
             row |= {"strain": velocity / real.shear_wave, "stress_ratio": row["fx"] / real.fy}
         table[k] = row
-    return {
-        **{key: first[key] for key in ("fx_c", "error")},
-        **{"v0": threshold(scene), "time": given.time, "on": given.on},
-        **{"largest_deviation": max(off, default=None), "map": table},
-    }
+    result = {"fx_c": first["fx_c"], "error": first["error"], "v0": threshold(scene), "time": given.time}
+    return result | {"on": given.on, "largest_deviation": max(off, default=None), "map": table}

@@ -298,9 +298,8 @@ def summary_of_rows(rows: Sequence[Row]) -> dict[str, Any]:
     ramps = [end for row in rows for end in row["result"].get("ramps", ())]
     eruptions = [found for row in rows if (found := row["result"].get("eruption"))]
     several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
-    lowered = [
-        row["result"]["lowered"] for row in several if row["says"] is None or row["result"]["lowered"] is not None
-    ]
+    tell = [(row["result"]["lowered"], row["says"] is None) for row in several]
+    lowered = [each for each, whole in tell if whole or each is not None]
     numbers: dict[str, Any] = {"onsets": []}
 
     def share_of(marks: Sequence[bool]) -> dict[str, Any]:

@@ -13,7 +13,8 @@ import json
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -91,24 +92,31 @@ def reference() -> dict:
 
 
 @pytest.fixture(scope="session")
-def reference_packing(reference: dict) -> Callable[[float], Packing]:
-    """The reference packing with zero slips, for a friction coefficient."""
+def reference_packing(reference: dict) -> Callable[..., Packing]:
+    """The reference packing, for a friction coefficient and other keys of the law; or compensated.
+
+    Its slips are zero, or shares of Coulomb's limit in turn.
+    """
     import numpy as np
 
     from faultgouge.analysis import MindlinLaw, Packing, touching
 
-    def make(mu: float) -> Packing:
+    def make(mu: float, compensated: bool = False, shares: Sequence[float] = (0.0,), **keys: object) -> Packing:
         position = np.column_stack([reference["x"], reference["y"]])
-        radius = np.array(reference["radius"])
-        return Packing(
+        radius, width = np.array(reference["radius"]), reference["box_length"]
+        law = MindlinLaw(**{"kn": reference["kn"], "kt": reference["kt"], "mu": mu} | keys)
+        packing = Packing(
             position=position,
             radius=radius,
             top=np.isin(np.arange(len(radius)), reference["top"]),
-            box_length=reference["box_length"],
-            law=MindlinLaw(kn=reference["kn"], kt=reference["kt"], mu=mu),
+            box_length=width,
+            law=law,
             fy=reference["fy_per_top_disk"],
-            contacts=touching(position, radius, reference["box_length"]),
+            contacts=touching(position, radius, width),
+            position_low=np.zeros_like(position) if compensated else None,
         )
+        slip = np.resize(shares, len(packing.contacts)) * law.slip_limit(packing.geometry.overlap)
+        return replace(packing, contacts=packing.contacts.slipped(slip)) if any(shares) else packing
 
     return make
 

@@ -277,9 +277,7 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     d, c = configuration.dimension, configuration.contacts
     if not np.all(configuration.periodic[:d]) or configuration.constraint is not None or c.wall.any():
         others = "stress(packing, volume) is that of others"
-        raise BadInputError(
-            f"Elastic moduli are those of a box periodic along all of its axes, without walls: {others}."
-        )
+        raise BadInputError(f"Elastic moduli are of a box periodic along all of its axes, without walls: {others}.")
     volume, box = volume_of(configuration)
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:

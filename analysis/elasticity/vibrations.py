@@ -128,10 +128,8 @@ def vibrations(packing: HasConfiguration, moments: int | None = None, vectors: i
     """
     configuration = packing.configuration
     scale = 1.0 / np.sqrt(configuration.coordinate_mass)
-    a, g = (
-        csr_array(diags_array(scale) @ each @ diags_array(scale))
-        for each in (stiffness_matrix(configuration), damping_matrix(configuration))
-    )
+    scaled, operators = diags_array(scale), (stiffness_matrix(configuration), damping_matrix(configuration))
+    a, g = (csr_array(scaled @ each @ scaled) for each in operators)
     if not a.nnz:
         raise BadInputError("Nothing vibrates: no particle touches another.")
     moments = moments or min(MOMENTS, max(64, configuration.coordinates // 8))

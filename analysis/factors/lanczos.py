@@ -201,9 +201,7 @@ class SlicedSpectrum:
                 if np.all(residuals[order[inner]] <= self.sizes.vector_residual * spacing * inverse[order[inner]] ** 2):
                     break
             if krylov.full:
-                raise SliceError(
-                    f"the eigenvalues about {shift:.6g} are not in a Krylov space of {krylov.used} vectors"
-                )
+                raise SliceError(f"eigenvalues about {shift:.6g} are not in a Krylov space of {krylov.used} vectors")
             krylov.extend(krylov.used + self.sizes.looks * block)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
         start = own[0] - first - kept.start

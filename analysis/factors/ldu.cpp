@@ -3,8 +3,8 @@
 //
 // This file is free software under the terms of the GNU General Public License, version 2 or later; see LICENSE.
 
-// Factors L D U of a sparse matrix without pivoting, and solutions with them, see sparse_lu.py. L and U^T have the pattern
-// that they would have if A had the entries of A + A^T.
+// Factors L D U of a sparse matrix without pivoting, and solutions with them, see sparse_lu.py. L and U^T have the
+// pattern that they would have if A had the entries of A + A^T.
 //
 // A symmetric matrix has one half, its lower one: U is L^T. Of any other matrix the transpose has the other half.
 //

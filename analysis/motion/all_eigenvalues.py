@@ -132,9 +132,8 @@ def eigenvalues_about(
     size = matrix.shape[0]
     factors = general_lu(csc_array(matrix - shift * eye_array(size)), ordered=True)
     random = np.random.default_rng(block)
-    right, left = (
-        BlockKrylov(partial(factors.solve, trans=side), random.standard_normal((block, size)), most) for side in "NT"
-    )
+    starts = ((partial(factors.solve, trans=side), random.standard_normal((block, size))) for side in "NT")
+    right, left = (BlockKrylov(solve, start, most) for solve, start in starts)
     while True:
         distances, radii = [], []
         for space in (right, left):
@@ -160,9 +159,8 @@ def eigenvalues_about(
     bases = []
     try:
         for space in (right, left):
-            *_, turn, count = schur(
-                space.square, output="real", sort=lambda a, b: np.hypot(a, b) * radius > 1, check_finite=False
-            )
+            within = {"sort": lambda a, b: np.hypot(a, b) * radius > 1, "check_finite": False}
+            *_, turn, count = schur(space.square, output="real", **within)
             bases.append(space.basis[: space.used].T @ turn[:, :count])
         v, u = bases
         both = u.T @ v

@@ -98,17 +98,13 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
     # F has four times the entries of S, and a slice a Krylov space: measured at 19,200 and at 72,000 coordinates
     needed = 1024 * getrusage(RUSAGE_SELF).ru_maxrss + 35 * entries + 12_000 * size
     factors = needed < 0.7 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    report_progress(
-        f"certificate: no motion faster than {w:.3g} grows; {count} slower ones to look at, about "
-        f"{work / 1.8e11:.2g} min and {needed / 1e9:.2g} GB"
-    )
+    cost = f"about {work / 1.8e11:.2g} min and {needed / 1e9:.2g} GB"
+    report_progress(f"certificate: no motion faster than {w:.3g} grows; {count} slower ones to look at, {cost}")
     decay, last = FREE_MARGIN * 0.5 * w**2 * ratio, 1.04**5 * w
     while not _is_positive((s, n, g, h), w, beta, decay, factors=factors):
         w *= 1.04
         if w > 0.999 * last:
-            raise NoProofError(
-                f"no frequency was found beyond which the dashpots hold growth up to {w:.3g} of {top:.3g}"
-            )
+            raise NoProofError(f"no frequency was found beyond which dashpots hold growth, up to {w:.3g} of {top:.3g}")
     del factored
     spectrum = SlicedSpectrum(csc_array(s))
     count, free, best, done, low = spectrum.below(w**2), 0, -np.inf, 0, 0.0
@@ -234,10 +230,8 @@ def _of_slice(
             return (s.real[among] + of > best) & (of > 1e-3 * np.abs(s.real[among]))  # noqa: B023  called within its turn of the loop
 
         # what each vector of the basis leaves outside bounds what a motion leaves
-        leaves = [
-            np.sqrt(np.maximum(np.sum(image**2, axis=0) - np.sum(inside**2, axis=0), 0.0))
-            for image, inside in zip(images, small, strict=True)
-        ]
+        squares = ([np.sum(each**2, axis=0) for each in pair] for pair in zip(images, small, strict=True))
+        leaves = [np.sqrt(np.maximum(whole - inside, 0.0)) for whole, inside in squares]
         still, turning = leaves[0] + leaves[1], leaves[2] + leaves[3]
         bounds = [still @ np.abs(each) + np.abs(s) * (turning @ np.abs(each)) for each in (x, y)]
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -66,9 +66,8 @@ def mass_weighted(stiffness: csr_array, packing: HasConfiguration) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(packing.coordinate_mass)
     rows = np.repeat(scale, np.diff(stiffness.indptr))
-    return csr_array(
-        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
-    )
+    columns = stiffness.indices
+    return csr_array((rows * stiffness.data * scale[columns], columns, stiffness.indptr), shape=stiffness.shape)
 
 
 def active_coordinates(matrix: csr_array) -> Indices:

@@ -80,10 +80,8 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
             if below == 0 and above is not None:
                 said = "the stiffness is symmetric, and its energy positive (proved)"
                 return Linear(True, 0.0, free=above, said=said)
-        why = (
-            f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a "
-            f"packing of {size} coordinates: give the packing its dashpots, or search it in slices by `onset`"
-        )
+        why = f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a "
+        why += f"packing of {size} coordinates: give the packing its dashpots, or search it in slices by `onset`"
         return replace(found, reasons=(why,))
     kept = opposed(motion)
     try:

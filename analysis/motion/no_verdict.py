@@ -14,13 +14,10 @@ def no_verdict(configuration: Configuration) -> Iterator[str]:
     sided = configuration.one_sided_particles
     if len(sided):
         named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")
-        yield (
-            f"the forces on {counted(len(sided), 'particle')} ({named}) have other derivatives forwards than "
-            "backwards, as where sliding, rolling or twisting friction is at its bound or a contact is about to open, "
-            "and K by differences of forces is the mean of both"
-        )
+        forces = f"the forces on {counted(len(sided), 'particle')} ({named})"
+        where = "as where sliding, rolling or twisting friction is at its bound or a contact is about to open"
+        both = "and K by differences of forces is the mean of both"
+        yield f"{forces} have other derivatives forwards than backwards, {where}, {both}"
     if not in_balance(configuration):
-        yield (
-            f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
-            f"the largest force of a contact or a wall {configuration.largest_force:.3g}"
-        )
+        largest = f"the largest force of a contact or a wall {configuration.largest_force:.3g}"
+        yield f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, {largest}"

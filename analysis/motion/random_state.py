@@ -294,10 +294,8 @@ def follow_decay(
         return replace(found, free=free)
     bound = min(searched, found.searched)
     would = f"`time` = {needed:.2g} would do" if np.isfinite(needed) else "in which motion did not decay"
-    reason = (
-        f"{why}; no motion was found to grow, and D grows no faster than exp({bound:.2g} t), as motion from a random "
-        f"state shows within t = {now:.4g}; {would}"
-    )
+    shows = f"as motion from a random state shows within t = {now:.4g}"
+    reason = f"{why}; no motion was found to grow, and D grows no faster than exp({bound:.2g} t), {shows}; {would}"
     return replace(found, free=free, searched=bound, reasons=(reason,))
 
 

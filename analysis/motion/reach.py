@@ -171,9 +171,8 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     two = one @ one
     before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
     for _ in range(22):  # doublings until the norm is to fall below one
-        sizes = [
-            svds(each, 1, v0=np.ones(2 * size), tol=1e-3, return_singular_vectors=False)[0] for each in (two, one @ two)
-        ]
+        how = {"v0": np.ones(2 * size), "tol": 1e-3, "return_singular_vectors": False}
+        sizes = [svds(each, 1, **how)[0] for each in (two, one @ two)]
         before, after = after, max(after, max(sizes) * before)
         if min(sizes) <= 1:
             return float(after**2), end

@@ -116,9 +116,8 @@ def motion_under_load(
     loaded = c.coordinate_free & (direction[:, 0] != 0)
     loaded[system.motion.active] = False
     if flying := len(np.unique(np.flatnonzero(loaded) % len(c))):
-        raise NotFollowedError(
-            f"the load accelerates {counted(flying, 'particle')} that nothing touches: give no forces on these"
-        )
+        alone = f"{counted(flying, 'particle')} that nothing touches"
+        raise NotFollowedError(f"the load accelerates {alone}: give no forces on these")
     velocity = _steady_velocity(system, load, free) if decays and not len(system.missing) else None
     if velocity is None:
         span, found = _followed(system, load, time)
@@ -135,10 +134,8 @@ def motion_under_load(
     least = max(reached, PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0)
     if change is not None and least >= change:
         what = "contacts counted as at Coulomb's bound reach it" if reached == least else "residual forces count less"
-        raise NotFollowedError(
-            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
-            "bring the packing to rest more closely"
-        )
+        before = f"another contact {event} before, at {change:.1g}: bring the packing to rest more closely"
+        raise NotFollowedError(f"{what} once the load has risen by {least:.1g}, and {before}")
     return FieldsByName(**found, least_rise=least, next_change=change, next_event=event)
 
 
@@ -200,11 +197,10 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
     # and of particles that nothing bears as its square
     first, last = len(windows) - np.array([0.875, 0.125]) * len(after)
     if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** 0.5 * quarters[0]:
-        raise NotFollowedError(
-            f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
-            f"{quarters[-1]:.3g} within t = {now:.4g}, as where the load accelerates particles whose contacts slide "
-            "on, or where the packing is slower than that: give more time"
-        )
+        rises = f"rises from {quarters[0]:.3g} to {quarters[-1]:.3g} within t = {now:.4g}"
+        where = "where the load accelerates particles whose contacts slide on, or the packing is slower than that"
+        says = f"no constant drift is seen: the mean velocity over the rate {rises}"
+        raise NotFollowedError(f"{says}, as {where}: give more time")
     span, (one, *others) = _of_starts(system, windows)
     whole: Window = tuple(sum(each) for each in zip(*span, strict=True))
     return whole, {**one, "time": now, "span": whole[0], "other_start": others[0] if others else None}
@@ -300,8 +296,7 @@ def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: NDArray[
     a = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
     moves = static_response(replace(system.motion, stiffness=a), load, 1)
     if np.linalg.norm(load - a @ moves) > 1e-6 * np.linalg.norm(load):
-        raise NotFollowedError(
-            "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
-        )
+        turned = "the load turns the forces of contacts at Coulomb's bound"
+        raise NotFollowedError(f"{turned}, and nothing holds the particles that slide then")
     size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
     return float(0.1 * np.sqrt(size / change)) if change else np.inf

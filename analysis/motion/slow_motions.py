@@ -84,9 +84,8 @@ def slow_motions(
     if known <= 2 * drifts:
         return None
     # up to a place where both spaces part the motions from those beyond
-    apart = [
-        k for k in range(2 * drifts + 1, known + 1) if all(sizes[k] < 0.97 * sizes[k - 1] for _, sizes, _ in spaces)
-    ]
+    counts = range(2 * drifts + 1, known + 1)
+    apart = [k for k in counts if all(sizes[k] < 0.97 * sizes[k - 1] for _, sizes, _ in spaces)]
     if not apart:
         return None
     count = apart[-1]

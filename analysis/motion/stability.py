@@ -44,10 +44,8 @@ from .verdict import Stability
 LARGE = 6000
 """Coordinates beyond which one push and its opposite stand for several, and K's spectrum is not computed."""
 
-UNSETTLED = (
-    "its residual forces alone take a contact to Coulomb's bound, open or close one: bring the packing to rest more "
-    "closely"
-)
+UNSETTLED = "its residual forces alone take a contact to Coulomb's bound, open or close one: "
+UNSETTLED += "bring the packing to rest more closely"
 """Why there is no verdict where the residual forces alone change a contact."""
 
 
@@ -184,10 +182,8 @@ def _after_pushes(found: Stability, system: OneSidedSystem, time: float | None) 
         reasons = (f"the motion has not settled: {why}",)
     elif outcome.grows is None:
         more = f"; `time` = {outcome.needed:.2g} may do" if outcome.needed else ""
-        why = (
-            f"the motion of contacts at Coulomb's bound has not settled within t = {outcome.time:.4g}, and D that "
-            f"grows more slowly than exp({outcome.searched:.2g} t) may not have been seen{more}"
-        )
+        slower = f"D that grows more slowly than exp({outcome.searched:.2g} t) may not have been seen{more}"
+        why = f"the motion of contacts at Coulomb's bound has not settled within t = {outcome.time:.4g}, and {slower}"
         reasons = (why,)
     elif outcome.grows:
         reasons, told["at_least"] = (), False
@@ -196,11 +192,9 @@ def _after_pushes(found: Stability, system: OneSidedSystem, time: float | None) 
     elif np.isinf(least):
         reasons = (UNSETTLED,)
     elif least >= most:
-        why = (
-            f"contacts that count as at Coulomb's bound reach it, or residual forces do not count, after pushes above "
-            f"{least:.1g} (velocity along an axis) alone, and other contacts change after pushes above {most:.1g}: "
-            "bring the packing to rest more closely"
-        )
+        why = "contacts that count as at Coulomb's bound reach it, or residual forces do not count, after pushes "
+        why += f"above {least:.1g} (velocity along an axis) alone, and other contacts change after pushes above "
+        why += f"{most:.1g}: bring the packing to rest more closely"
         reasons = (why,)
     return told | {"stable": None if reasons else not outcome.grows, "reasons": reasons}
 

@@ -139,11 +139,10 @@ class Stability:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
             size = as_known(outcome.least_amplification, outcome.amplification)
-            return (
-                f"stable: each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square "
-                f"velocity of the push while contacts slide (followed for t = {outcome.time:.4g}{left})"
-                + (f"; with sticking contacts, {said}" if said else "")
-            )
+            stuck = f"; with sticking contacts, {said}" if said else ""
+            reaches = f"D reaches {size} times the mean square velocity of the push while contacts slide"
+            followed = f"(followed for t = {outcome.time:.4g}{left})"
+            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {reaches} {followed}{stuck}"
         if said:
             return f"stable: {said}{free}"
         if self.dissipative and self.growth_rate < 0:
@@ -168,20 +167,17 @@ class Stability:
             if sided:
                 on = max(self.sliding.free - self.sticking.free, 0)
                 ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""
-                yield (
-                    f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
-                    f"slid on, {ever}{_neighbour(self.sliding)}"
-                )
+                slid = f"if all slid on, {ever}{_neighbour(self.sliding)}"
+                stuck = f"if all of them stuck, {_neighbour(self.sticking)}"
+                yield f"neither of two linear motions decides: {stuck}; {slid}"
         if self.stable and self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
         if self.stable and creep is not None and self.dissipative:
             later = "" if creep.settled else ", and farther later"
             if not creep.settled and creep.limit is not None:
                 later = f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
-            yield (
-                f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
-                f"of the push within t = {creep.time:.4g}{later}"
-            )
+            times = f"{creep.amplification:.2g} times the mean square velocity of the push within t = {creep.time:.4g}"
+            yield f"{WORN}, and they stay displaced, by D up to {times}{later}"
         elif self.stable and creep is not None:
             known = as_known(creep.least_velocity, creep.velocity)
             yield f"{WORN}: D as ({known} t)^2 times the mean square velocity of the push"
@@ -192,10 +188,9 @@ class Stability:
         if outcome is not None:
             least, most = outcome.scales
             if outcome.grows and np.isfinite(least):
-                yield (
-                    f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
-                    "ones contacts that count as at the bound may stay below it, or residual forces count"
-                )
+                smaller = "contacts that count as at the bound may stay below it, or residual forces count"
+                after = f"pushes from {least:.1g} on (velocity along an axis)"
+                yield f"this growth is seen after {after}: after smaller ones {smaller}"
             elif self.stable and least < most:
                 yield (
                     f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where "
@@ -203,18 +198,14 @@ class Stability:
                     f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
                 )
         elif self.stable and most is not None and least >= most:
-            yield (
-                f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
-                f"{most:.1g} a contact may open, close or slide"
-            )
+            above = f"above {most:.1g} a contact may open, close or slide"
+            yield f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and {above}"
         elif self.stable and most is not None:
             below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
             within = f", until t = {self.push_time:.3g}" if self.push_time else ""
-            yield (
-                f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
-                f"{within}: no contact opens, closes or slides{worn}{below}"
-            )
+            pushes = f"every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
+            yield f"holds for {pushes}{within}: no contact opens, closes or slides{worn}{below}"
         elif self.stable and not self.asymmetry:
             above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
             says = "which push changes a contact, K by differences of forces does not say"

@@ -76,10 +76,8 @@ class ContactChanges:
         along = _directions(c.tangential_force, c.normal)
         across = np.cross(c.normal, along)
         coupling = 0.5 * (c.closing + c.parting)
-        gains = [
-            tangential_rows(configuration, each, c.tangential_stiffness, np.einsum("ca,ca->c", coupling, each))
-            for each in (along, across)
-        ]
+        ways = ((each, np.einsum("ca,ca->c", coupling, each)) for each in (along, across))
+        gains = [tangential_rows(configuration, each, c.tangential_stiffness, part) for each, part in ways]
         overlaps = overlap_rows(configuration)
         bears = np.isfinite(c.friction) & (c.friction > 0) & (c.normal_force > 0)
         bound = np.where(bears, c.friction, 0.0)

@@ -75,13 +75,12 @@ def sliders_of(configuration: Configuration) -> Sliders:
     along = c.tangential_force / np.linalg.norm(c.tangential_force, axis=1, keepdims=True)
     coupling = np.einsum("ca,ca->c", 0.5 * (c.closing + c.parting), along)
     friction = c.friction / c.normal_force
+    loss = -friction * c.normal_dashpot * c.viscous_slider
     return Sliders(
         contact=which,
         force=csr_array(unit_forces(here, along).T),
         excess=tangential_rows(here, along, c.tangential_stiffness, coupling - friction * c.normal_stiffness),
-        viscous_excess=tangential_rows(
-            here, along, c.tangential_dashpot, -friction * c.normal_dashpot * c.viscous_slider
-        ),
+        viscous_excess=tangential_rows(here, along, c.tangential_dashpot, loss),
         rectified=0.5 * np.einsum("ca,ca->c", c.closing - c.parting, along),
         viscous=c.viscous_slider,
     )

@@ -133,11 +133,9 @@ class Packing(EqualToTheBit):
 
     def __repr__(self) -> str:
         box = "open sides" if self.box_length is None else f"period {self.box_length:g}"
-        return (
-            f"<Packing: {counted(len(self), 'disk')}, {counted(len(self.contacts), 'contact')}, {int(self.top.sum())} "
-            f"in the upper layer, {box}, mu = {self.law.mu:g}, fx = {self.fx:g}, fy = {self.fy:g}"
-            f"{', compensated' if self.compensated else ''}>"
-        )
+        disks = f"{counted(len(self), 'disk')}, {counted(len(self.contacts), 'contact')}, {int(self.top.sum())}"
+        load = f"mu = {self.law.mu:g}, fx = {self.fx:g}, fy = {self.fy:g}{', compensated' * self.compensated}"
+        return f"<Packing: {disks} in the upper layer, {box}, {load}>"
 
     dimension = 2
     axes = 3

@@ -204,9 +204,8 @@ class Motions:
     def with_conjugates(self) -> tuple[Complexes, Any, Any]:
         """Eigenvalues with right and left vectors, both of each two conjugates, by real part."""
         pairs = np.flatnonzero(self.values.imag > 0)
-        values, x, y = (
-            np.concatenate([each, each[..., pairs].conj()], axis=-1) for each in (self.values, self.right, self.left)
-        )
+        arrays = (self.values, self.right, self.left)
+        values, x, y = (np.concatenate([each, each[..., pairs].conj()], axis=-1) for each in arrays)
         order = np.lexsort((values.imag, values.real))
         return values[order], x[:, order], y[:, order]
 

@@ -232,9 +232,8 @@ def kept_results(folder: Path) -> list[SliceResult]:
     damaged = OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile
     for path in folder.glob("*-*.npz"):
         with suppress(*damaged), np.load(path) as data:
-            modes, border, motions, crowded = (
-                data[name].tolist() for name in ("modes", "border", "motions", "crowded")
-            )
+            names = ("modes", "border", "motions", "crowded")
+            modes, border, motions, crowded = (data[name].tolist() for name in names)
             candidates = [Candidate(int(k.real), a.real, b.real, *rest) for k, a, b, *rest in motions]
             found.append(SliceResult(Border(tuple(modes), *border), candidates, crowded))
     return sorted(found, key=lambda each: each.border.modes)

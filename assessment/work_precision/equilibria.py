@@ -69,9 +69,8 @@ def relaxation(settings: Settings) -> Study:
 
         plain, fine = (1e-1, 1e-4, 1e-7, 0.0), (1e-1, 1e-4, 1e-7, 1e-12, 0.0)
         runs: list[Run] = [("Newton", force, partial(newton, engine, start, force)) for force in plain]
-        runs += [
-            ("Newton" + COMPENSATED_SUFFIX, force, partial(newton, careful, careful_start, force)) for force in fine
-        ]
+        name = "Newton" + COMPENSATED_SUFFIX
+        runs += [(name, force, partial(newton, careful, careful_start, force)) for force in fine]
         runs += [("Verlet with drag", n, partial(verlet, n)) for n in (50, 100, 200, 400, 800)]
         forces = np.logspace(-3, -9, 4 if settings.quick else 7).tolist()
         runs += [("overdamped", force, partial(overdamped, force)) for force in forces]

@@ -28,9 +28,8 @@ from .equilibria import onset, relaxation
 from .study import COMPENSATED_SUFFIX, WORDS, Settings, Study
 from .time_steps import growth, trajectory
 
-STUDIES: dict[str, Callable[[Settings], Study]] = {
-    WORDS[study.__name__]["name"]: study for study in (trajectory, growth, relaxation, onset)
-}
+ALL: tuple[Callable[[Settings], Study], ...] = (trajectory, growth, relaxation, onset)
+STUDIES = {WORDS[study.__name__]["name"]: study for study in ALL}
 """By name, in the order of the report."""
 
 SCENE = Path(str(files("faultgouge") / "scenes" / "report.toml"))
@@ -68,10 +67,8 @@ def report(
         write_results(output, "report", __package__ or "", result, stem=stem)
     if failed:
         names = ", ".join(each["name"] for each in failed)
-        raise AssessmentError(
-            f"{len(failed)} of {len(studies)} studies failed ({names}): {output}/report.md says why, the others are "
-            "complete"
-        )
+        why = f"{output}/report.md says why, the others are complete"
+        raise AssessmentError(f"{len(failed)} of {len(studies)} studies failed ({names}): {why}")
     return result
 
 

@@ -119,9 +119,8 @@ def growth(settings: Settings) -> Study:
 
         steps = (limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])).tolist()
         points, errors = timed([(RUN, dt, partial(run, dt)) for dt in steps], settings, lambda errors: errors[0])
-    corrected = [
-        point._replace(method=RUN_CORRECTED, error=off) for point, (_, off) in zip(points, errors, strict=True)
-    ]
+    off = (each for _, each in errors)
+    corrected = [point._replace(method=RUN_CORRECTED, error=each) for point, each in zip(points, off, strict=True)]
     noise = float(np.median([point.error for point in corrected]))
     order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
     numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}

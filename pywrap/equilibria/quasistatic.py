@@ -23,9 +23,8 @@ from ..lammps.engine import Engine
 from .newton import Guess, iterate_newton, too_long
 from .newton_matrix import factor_stiffness
 
-SMOOTH_FLOOR_ADVICE = (
-    "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
-)
+SMOOTH_FLOOR_ADVICE = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, "
+SMOOTH_FLOOR_ADVICE += "so give law.mu a value above 0"
 
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends."""
@@ -87,11 +86,9 @@ class Equilibrium:
     def __str__(self) -> str:
         packing = self.packing
         load = f"F_x = {packing.fx:g}: " if packing.fx else ""
-        return (
-            f"{load}{counted(len(packing), 'disk')}, {counted(len(packing.contacts), 'contact')}, "
-            f"{counted(len(packing.rattlers), 'rattler')}; "
-            f"residual {self.residual:.2g} (rounding floor {self.floor:.2g})"
-        )
+        numbers = {"disk": len(packing), "contact": len(packing.contacts), "rattler": len(packing.rattlers)}
+        parts = ", ".join(counted(number, name) for name, number in numbers.items())
+        return f"{load}{parts}; residual {self.residual:.2g} (rounding floor {self.floor:.2g})"
 
 
 def rounding_floor(packing: Packing) -> float:

@@ -51,10 +51,8 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
         "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous), or "
         "allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
-    raise NotTakenError(
-        f"The packing moves: the residual of {who} is {size[worst] / force if force else np.inf:.3g} of the mean "
-        f"contact force, and {balance:g} is allowed{also}; {advice}."
-    )
+    share = f"{size[worst] / force if force else np.inf:.3g} of the mean contact force, and {balance:g} is allowed"
+    raise NotTakenError(f"The packing moves: the residual of {who} is {share}{also}; {advice}.")
 
 
 def motion_remarks(
@@ -70,11 +68,10 @@ def motion_remarks(
     surface = np.maximum(speed, c.radius * np.linalg.norm(rotation, axis=1))
     drives = ~c.free & (surface * timestep > HELD_SPEED * c.radius)
     if count := int(drives.sum()):
-        says.append(
-            f"{counted(count, 'particle')} that no fix moves {'have' if count > 1 else 'has'} velocities or rotations, "
-            f"up to {surface[drives].max():.3g} at the surface, which drive contacts in LAMMPS, and are zero here: "
-            "give them `velocity GROUP set 0 0 0` and `set group GROUP omega 0 0 0`"
-        )
+        have = "have" if count > 1 else "has"
+        drive = f"up to {surface[drives].max():.3g} at the surface, which drive contacts in LAMMPS, and are zero here"
+        still = f"{counted(count, 'particle')} that no fix moves {have} velocities or rotations, {drive}"
+        says.append(f"{still}: give them `velocity GROUP set 0 0 0` and `set group GROUP omega 0 0 0`")
     stiffest = abs(c.assembled_stiffness()).max(axis=1).toarray().ravel()
     stiffest = (stiffest if c.constraint is None else (c.constraint != 0) @ stiffest).reshape(c.axes, -1).max(axis=0)
     moves = c.free & (speed * np.sqrt(stiffest * c.mass) > BALANCE * force_scale(c))
@@ -109,10 +106,9 @@ def keeps_moving(commands: Commands) -> str:
         lines += f" {line}" * words[3].startswith("wall/gran")
     for style in ("linear_nohistory", "gran/hooke", "wall/gran hooke"):
         if f" {style} " in lines:
-            return (
-                f"the friction of {style} opposes velocities alone and bears no force at rest, so that slopes and "
-                "heaps creep without end: take linear_history, or hooke/history"
-            )
+            creep = "bears no force at rest, so that slopes and heaps creep without end: "
+            creep += "take linear_history, or hooke/history"
+            return f"the friction of {style} opposes velocities alone and {creep}"
     return ""
 
 

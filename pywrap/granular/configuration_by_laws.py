@@ -93,10 +93,9 @@ def _linearised_contacts(
     infinite where frozen."""
     pairs, parts, couples = contacts_of_pairs(found), [], []
     types = np.sort([found["type"][pairs.geometry["i"]], found["type"][pairs.geometry["j"]]], axis=0).T
-    groups: dict[Any, OneLaw] = {
-        (a, b): pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
-        for a, b in np.unique(types, axis=0).tolist()
-    }
+    groups: dict[Any, OneLaw] = {}
+    for a, b in np.unique(types, axis=0).tolist():
+        groups[a, b] = pairs.chosen(np.all(types == (a, b), axis=1), f"contacts of types {a} and {b}")
     for name in [name.removeprefix("wall ") for name in found if name.startswith("wall ")]:
         groups[name] = _contacts_of_wall(found, name, commands.fixes[name])
     for name, every in groups.items():
@@ -144,21 +143,13 @@ def _linearise_measured(
     """Contacts of a law that has been measured, and their rolling friction, whose torque on the first partner is
     R n x f of LAMMPS's rolling force f; `mass` as above."""
     i, j, overlap, arms, normal = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm", "normal"))
-    fn, ft, wall, none, zero = (
-        contacts.forces[:, 0],
-        contacts.forces[:, 1:],
-        j == WALL,
-        np.zeros_like(normal),
-        0.0 * overlap,
-    )
+    fn, ft = contacts.forces[:, 0], contacts.forces[:, 1:]
+    wall, none, zero = j == WALL, np.zeros_like(normal), 0.0 * overlap
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
     inverse = 1 / mass[i] + 1 / mass[j]
     of_pair = np.divide(1.0, inverse, out=0.0 * inverse, where=inverse > 0)
-    of_state = (
-        np.where(wall, arms[:, 0], arms.prod(axis=1) / arms.sum(axis=1)),
-        overlap,
-        np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], of_pair),
-    )
+    radius = np.where(wall, arms[:, 0], arms.prod(axis=1) / arms.sum(axis=1))
+    of_state = radius, overlap, np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], of_pair)
     stiffness, lever = (1 + law["stiffness"].overlap) * fn / overlap, law["lever"]
     _agree(law["stiffness"].at(*of_state) * overlap, stiffness, contacts)
     sticks = LinearisedContacts(
@@ -184,9 +175,8 @@ def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
     said, rounding = contacts.forces[:, 0], OVERLAP_ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
     if len(said) and np.any(np.abs(computed - said) > FORCE_AGREEMENT * np.max(np.abs(said)) + rounding):
-        raise NotTakenError(
-            f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
-        )
+        other = f"The normal forces of the {contacts.who} are not those of the commands"
+        raise NotTakenError(f"{other}: {GIVE_LINES}, as they hold now.")
 
 
 def _geometry(
@@ -202,9 +192,8 @@ def contacts_of_pairs(found: Arrays) -> OneLaw:
     rows[:, : found["contacts"].shape[1]] = found["contacts"]
     i, j = np.searchsorted(found["id"], found["partners"]).T
     if np.any(i == j):
-        raise NotTakenError(
-            f"Particle {int(found['id'][i[i == j][0]])} touches its own periodic image: take a box that is wider."
-        )
+        particle = int(found["id"][i[i == j][0]])
+        raise NotTakenError(f"Particle {particle} touches its own periodic image: take a box that is wider.")
     # in LAMMPS of 2024 dx, dy and dz may point to the second of the partners
     branch, between = rows[:, :3], found["x"][i] - found["x"][j]
     beside = [(between - sign * branch) @ np.linalg.inv(found["box"]) for sign in (1, -1)]

@@ -82,17 +82,14 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
     first = state._replace(overlap=min(max(state.overlap, least), most))
-    others = (
-        first._replace(overlap=0.5 * first.overlap),
-        first._replace(masses=(3 * first.masses[0], 2 * first.masses[1])),
-        first._replace(radii=(0.5 * first.radii[0], 0.8 * first.radii[1])),
-    )
+    heavier, smaller = (3 * first.masses[0], 2 * first.masses[1]), (0.5 * first.radii[0], 0.8 * first.radii[1])
+    changes = ({"overlap": 0.5 * first.overlap}, {"masses": heavier}, {"radii": smaller})
+    others = tuple(first._replace(**change) for change in changes)
     try:
         bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
     except Exception as error:  # whatever LAMMPS says of the commands
-        raise NotTakenError(
-            f"The commands of the {who} do not stand alone ({explain_error(error)}): {GIVE_LINES}."
-        ) from error
+        says = f"The commands of the {who} do not stand alone ({explain_error(error)}): {GIVE_LINES}."
+        raise NotTakenError(says) from error
     with closing(bench.lammps):
         states, found = zip(*(bench.measure(each) for each in (first, *others)), strict=True)
     law: Law = {each: found[0][each] for each in ("mu", "mu_rolling")}
@@ -122,9 +119,8 @@ def _quarter(value: float, what: str) -> float:
     """The multiple of 1/4 that a measured exponent is; an error if it is none."""
     nearest = round(4 * value) / 4
     if not abs(value - nearest) < EXPONENT_ERROR:
-        raise NotTakenError(
-            f"The {what} has the measured exponent {value:.9g}, which no contact law of LAMMPS that is known here has."
-        )
+        says = f"The {what} has the measured exponent {value:.9g}"
+        raise NotTakenError(f"{says}, which no contact law of LAMMPS that is known here has.")
     return nearest
 
 

@@ -110,10 +110,9 @@ def take_configuration(
         if np.any(beyond):
             mu = np.min(c.friction[beyond] / c.normal_force[beyond])
             moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
-            raise NotTakenError(
-                f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, with mu = "
-                f"{mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
-            )
+            says = f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands"
+            other = f"{moves}the commands are not those of the instance; {GIVE_LINES}, as they hold now."
+            raise NotTakenError(f"{says}, with mu = {mu:.3g}: {other}")
         return _at_rest(lmp, found, looked, balance=balance, prove=prove)
     except NotLinearisedError as error:
         reason = error

@@ -141,10 +141,9 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
     for name, style in styles.items():
         line = commands.fixes.get(name, "").split()
         if style.startswith(CHANGES) and style not in MOBILE:
-            raise NotTakenError(
-                f"fix {name} {style} moves or holds particles, or changes velocities, in a way that is not known here: "
-                "unfix it, or use fix nve/sphere and fix setforce, and let the packing come to rest."
-            )
+            cure = "unfix it, or use fix nve/sphere and fix setforce, and let the packing come to rest."
+            does = "moves or holds particles, or changes velocities, in a way that is not known here"
+            raise NotTakenError(f"fix {name} {style} {does}: {cure}")
         if style in (*WALLS, *MOBILE) and without_suffix(" ".join(line[3:4])) != style:
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINES}.")
         at = place_of_wall(line)
@@ -203,11 +202,9 @@ def translating_bodies(line: str, dimension: int) -> dict[str, NDArray[np.bool_]
         which = slice(int(low or 1) - 1, int(high or len(groups)) if star else int(low))
         (axes if what == "force" else turns)[which] = [word in YES for word in moves]
     if not groups or (turns if dimension == 3 else turns[:, 2:]).any():
-        raise NotTakenError(
-            f"fix {name} {style} {kind} holds particles together in bodies that may rotate, and rotations of bodies "
-            "are not linearised here: for lids that do not rotate use fix rigid single, or group, with `torque * off "
-            "off off` at the end of its line."
-        )
+        holds = "holds particles together in bodies that may rotate, and rotations of bodies are not linearised here"
+        cure = "for lids that do not rotate use fix rigid single, or group, with `torque * off off off`"
+        raise NotTakenError(f"fix {name} {style} {kind} {holds}: {cure} at the end of its line.")
     return dict(zip(groups, axes, strict=True))
 
 
@@ -244,18 +241,14 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
         elif style in BODIES:  # it moves the particles of its bodies alone, whatever its own group is
             for group, along in translating_bodies(lines[name], dimension).items():
                 body = members[f"{name} {group}"]
-                moves[:3, body], leader[:3, body], felt[body] = (
-                    along[:, None],
-                    np.flatnonzero(body)[:1],
-                    mass[body].sum(),
-                )
+                moves[:3, body], leader[:3, body] = along[:, None], np.flatnonzero(body)[:1]
+                felt[body] = mass[body].sum()
         for k, word in enumerate(words[:3] if style in order[:2] else ()):
             if word == "NULL":
                 continue
             if "v_" in word or (style == "setforce" and float(word) != 0.0):
-                raise NotTakenError(
-                    f"fix {name} {style} drives particles by the force {word}: use 0.0 or NULL, and fix addforce."
-                )
+                says = f"drives particles by the force {word}: use 0.0 or NULL, and fix addforce."
+                raise NotTakenError(f"fix {name} {style} {says}")
             if style == "setforce":
                 moves[k, here] = False
             else:
@@ -264,10 +257,8 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     axes = np.arange(6) if dimension == 3 else np.array([0, 1, 5])
     free = moves[axes].any(axis=0)
     if not free.any():
-        raise NotTakenError(
-            "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
-            "them are free and what their moments of inertia are."
-        )
+        why = "so that it is known which of them are free and what their moments of inertia are."
+        raise NotTakenError(f"Nothing moves the particles: give the line of fix nve/sphere, or set it up, {why}")
     row = np.flatnonzero(moves[axes])
     column = (leader[axes] + len(mass) * np.arange(len(axes))[:, None]).ravel()[row]
     constraint = csr_array((weight[axes].ravel()[row], (row, column)), shape=2 * (len(axes) * len(mass),))

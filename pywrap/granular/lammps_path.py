@@ -230,9 +230,8 @@ class _Relaxation:
         lmp, first = self.lmp, self.found is None
         try:
             self.set(value)
-            found, self.rate = bring_to_rest(
-                lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
-            )
+            rest = self.balance, self.steps, self.rate, f" at {value:.10g}"
+            found, self.rate = bring_to_rest(lmp, self.look, self.look(), *rest)
             if first:  # all others are forked from it; a proof may show that laws do not serve
                 found = self.look(prove=True)
                 self.look = partial(self.look, differences=found.operators == "differences")
@@ -243,9 +242,8 @@ class _Relaxation:
         except Exception as error:  # LAMMPS, and a user's function, raise any error
             return NotTakenError(f"At {value:g}: {explain_error(error)}")
         if change == 0.0:
-            return NotTakenError(
-                f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
-            )
+            cure = "does apply set it, or a fix read the variable?"
+            return NotTakenError(f"No force changes with the load at {value:g}: {cure}")
         return derive_frozen(found, fx=value, load_error=found.residual / change)
 
     def set(self, value: float) -> None:

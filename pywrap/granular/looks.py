@@ -89,9 +89,8 @@ def look(lmp: Any, given: Commands | None, files: dict[int, OpenFile], *, whole:
     styles, dimension = styles_of(lmp), lmp.extract_setting("dimension")
     fixes = styles.fixes
     if styles.pair != given.style:
-        raise NotTakenError(
-            f"The commands have pair_style {given.style}, and the instance has {styles.pair}: {GIVE_LINES}."
-        )
+        two = f"The commands have pair_style {given.style}, and the instance has {styles.pair}"
+        raise NotTakenError(f"{two}: {GIVE_LINES}.")
     if not lmp.extract_setting("radius_flag") or any(word in styles.atom for word in ("body", "ellipsoid", "bpm")):
         raise NotTakenError(f"atom_style {styles.atom} has no disks and spheres alone: use atom_style sphere.")
     if lmp.extract_global("ftm2v") != 1.0:
@@ -137,10 +136,8 @@ def _commands_in(log: OpenFile | None) -> Commands:
     path, place = log
     text = Path(path).read_text(errors="replace")
     if "\0" in text or os.path.getsize(path) != place:
-        raise NotTakenError(
-            f"{path} is the log of another LAMMPS, too: give each LAMMPS a log of its own (-log FILE), or the lines as "
-            "from_lammps(lmp, commands=[...])."
-        )
+        cure = "give each LAMMPS a log of its own (-log FILE), or the lines as from_lammps(lmp, commands=[...])"
+        raise NotTakenError(f"{path} is the log of another LAMMPS, too: {cure}.")
     return read_commands(text, log=True)
 
 

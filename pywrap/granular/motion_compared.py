@@ -57,10 +57,8 @@ class MotionComparison:
     periods: float
 
     def __str__(self) -> str:
-        return (
-            f"relative difference {self.difference:.2g} after t = {self.time:.4g}, {self.periods:.3g} periods of the "
-            "fastest vibration"
-        )
+        after = f"t = {self.time:.4g}, {self.periods:.3g} periods of the fastest vibration"
+        return f"relative difference {self.difference:.2g} after {after}"
 
 
 def compare_motion(

@@ -71,10 +71,9 @@ def prove(lmp: Any, configuration: Configuration, others: str) -> float | None:
     timestep = STEP_PHASE / (0.5 * (d + np.sqrt(d * d + 4 * k)))  # stable: over a bound of the root of s^2 = d s + k
     difference = _least_difference(lmp, c, timestep, STEPS_OF_PROOF)
     if by_laws and _other_stiffness(lmp, c) > OTHER_STIFFNESS:
-        raise NotProvedError(
-            "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
-            f"contact has; {others or 'something acts on particles by their positions'}."
-        )
+        alike = "where all particles are displaced alike, forces change that no contact has"
+        cause = others or "something acts on particles by their positions"
+        raise NotProvedError(f"LAMMPS's forces do not change as K says: {alike}; {cause}.")
     if len(c.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
     if difference > LARGEST_DIFFERENCE:
@@ -82,10 +81,8 @@ def prove(lmp: Any, configuration: Configuration, others: str) -> float | None:
         difference = min(difference, shorter)
     if difference <= (DOUBTFUL if by_laws and others else LARGEST_DIFFERENCE):
         return difference
-    says = (
-        f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
-        f"by {difference:.2g} of itself; {_likely(c, others)}."
-    )
+    differs = f"the change differs by {difference:.2g} of itself; {_likely(c, others)}."
+    says = f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities {differs}"
     raise (NotProvedError if by_laws and others else NotTakenError)(says)
 
 
@@ -96,10 +93,8 @@ def _likely(c: Configuration, others: str) -> str:
         slide = f"{counted(int(close.sum()), 'contact')} at Coulomb's bound or just below may slide while the packing "
         causes.append(f"{slide}creeps: run on with drag until it rests")
     if c.operators == "laws":
-        causes.append(
-            "the commands are those of another run or instance, or some are not in the log (echo none, a full disk), "
-            f"or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now"
-        )
+        log = "the commands are those of another run or instance, or some are not in the log (echo none, a full disk)"
+        causes.append(f"{log}, or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now")
     else:
         causes.append(
             f"K by differences of forces misses {c.operator_error:.1g} of the forces of a displacement of all "
@@ -137,9 +132,8 @@ def _least_difference(lmp: Any, c: Configuration, timestep: float, count: int) -
         """Of the changes of velocities from 1, -1 and 0 times the start, in the mixtures of the columns."""
         starts = amplitude * np.outer(start, [1.0, -1.0, 0.0][: len(mix)])
         ends = np.column_stack([steps_in_a_copy(lmp, c, v, timestep, count) for v in starts.T])
-        seen, expected = (
-            weight * ((each - starts) @ mix) for each in (ends, _linear_steps(c, starts, timestep, count))
-        )
+        both = ends, _linear_steps(c, starts, timestep, count)
+        seen, expected = (weight * ((each - starts) @ mix) for each in both)
         return float((np.linalg.norm(seen - expected, axis=0) / np.linalg.norm(expected, axis=0)).max())
 
     # the rounding of a displacement is some units in the last place of the largest coordinate; roundings over the

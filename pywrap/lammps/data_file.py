@@ -9,9 +9,8 @@ from ...analysis.files.formats.lammps_data import box_lines
 def data_file(packing: Packing) -> str:
     """A LAMMPS data file of the disks, type 2 the upper layer; lengths to the bit, masses left to the decks."""
     columns = packing.top.tolist(), (2 * packing.radius).tolist(), *packing.position.T.tolist()
-    disks = [
-        f"{n} {1 + top} {d!r} 1.0 {x!r} {y!r} 0.0" for n, (top, d, x, y) in enumerate(zip(*columns, strict=True), 1)
-    ]
+    rows = enumerate(zip(*columns, strict=True), 1)
+    disks = [f"{n} {1 + top} {d!r} 1.0 {x!r} {y!r} 0.0" for n, (top, d, x, y) in rows]
     head = ["faultgouge packing", "", f"{len(packing)} atoms", "2 atom types", *box_lines(packing)]
     return "\n".join([*head, "", "Atoms # sphere", "", *disks, ""])
 

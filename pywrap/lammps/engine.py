@@ -252,12 +252,8 @@ class Engine(LammpsState):
         if mobile := "mobile" * ("still" in groups):
             self.command("group mobile subtract all still")
             undo.append("group mobile delete")
-        self.include(
-            "undamped.in",
-            mobile=mobile or "all",
-            dt=time_step,
-            tau=packing.drag_time if drag_time is None else drag_time,
-        )
+        drag_time = packing.drag_time if drag_time is None else drag_time
+        self.include("undamped.in", mobile=mobile or "all", dt=time_step, tau=drag_time)
         if packing.law.damped:
             law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
             # `explain` takes the floor away

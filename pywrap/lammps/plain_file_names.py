@@ -33,10 +33,9 @@ def temporary_folder() -> tempfile.TemporaryDirectory[str]:
     for place in (tempfile.gettempdir(), "/tmp", "/var/tmp", "/dev/shm"):
         if PLAIN.fullmatch(place) and os.access(place, os.W_OK | os.X_OK):
             return tempfile.TemporaryDirectory(prefix="faultgouge-", dir=place)
-    raise FaultgougeError(
-        f"temporary files cannot lie in {tempfile.gettempdir()!r}, a name that LAMMPS would not read as one word: set "
-        "TMPDIR to a folder whose name has letters, digits and _ . / + : @ = ~ - alone."
-    )
+    name = f"{tempfile.gettempdir()!r}, a name that LAMMPS would not read as one word"
+    cure = "set TMPDIR to a folder whose name has letters, digits and _ . / + : @ = ~ - alone."
+    raise FaultgougeError(f"temporary files cannot lie in {name}: {cure}")
 
 
 @contextmanager

@@ -208,10 +208,8 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     slowest = nearest_modes(start, 0.0, 1).values.real.min()
     loading = bears / (spring * fastest)
     periods = loading * math.sqrt(max(slowest, np.finfo(float).tiny)) / (2 * math.pi)
-    says = (
-        f"drive.velocity = {fastest:g} loads the layer to mu F_y in {loading:.3g}, which is {periods:.2g} periods of "
-        f"its slowest vibration"
-    )
+    within = f"{loading:.3g}, which is {periods:.2g} periods of its slowest vibration"
+    says = f"drive.velocity = {fastest:g} loads the layer to mu F_y in {within}"
     needs = f"slow driving takes {LEAST_LOADING_PERIODS:g} or more"
     if periods < REFUSED_LOADING_PERIODS:
         slow = fastest * periods / LEAST_LOADING_PERIODS
@@ -301,10 +299,9 @@ def drive(
             energy, at_bound = motion.kinetic_energy(start), int(np.count_nonzero(packing.sliding))
             sample = DriveSample(time, force, displacement, thickness, energy, at_bound)
             if thickness > 1.5 * height:
-                raise FaultgougeError(
-                    f"the upper layer has left the bed at t = {time:g}: its mean height is {thickness:.3g}, and was "
-                    f"{height:.3g}; take a slower drive, a softer spring or a larger load.fy"
-                )
+                left = f"the upper layer has left the bed at t = {time:g}"
+                rise = f"its mean height is {thickness:.3g}, and was {height:.3g}"
+                raise FaultgougeError(f"{left}: {rise}; take a slower drive, a softer spring or a larger load.fy")
             slip = ended(sample)
             under_way = detector.so_far if detector else None
             slips += slip is not None

@@ -27,10 +27,8 @@ def ramp_loads(scene: Scene) -> Floats:
     """
     settings = require_section(scene.ramp, "ramp")
     if settings.first < 0:
-        raise SceneError(
-            f"ramp.until goes to F_x = {settings.first:g} first, and onsets are sought above 0: give a first turning "
-            "point above 0"
-        )
+        cure = "and onsets are sought above 0: give a first turning point above 0"
+        raise SceneError(f"ramp.until goes to F_x = {settings.first:g} first, {cure}")
     return way_to(0.0, settings.first, settings.step)
 
 
@@ -69,7 +67,5 @@ def count_behind(settings: Ramp, reached: Floats) -> int:
     for one, more, behind in ((reached, wanted, k), (wanted, reached, len(wanted))):
         if 0 < k == len(one) - 1 and min(more[k - 1 : k + 1]) < one[k] < max(more[k - 1 : k + 1]):
             return behind
-    raise SceneError(
-        f"the run has gone to F_x = {reached[k]:g} where ramp.until leads to F_x = {wanted[k]:g}: give another name "
-        "with -o, or delete it"
-    )
+    leads = f"ramp.until leads to F_x = {wanted[k]:g}: give another name with -o, or delete it"
+    raise SceneError(f"the run has gone to F_x = {reached[k]:g} where {leads}")

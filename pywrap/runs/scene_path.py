@@ -28,10 +28,9 @@ def next_equilibrium(
     engine.set_fx(fx)
     relaxation = engine.relax(tolerance, scene.relax.damping, scene.relax.time_step)
     if relaxation.status == "no":
-        raise NoEquilibriumError(
-            f"the relaxation at F_x = {fx:.10g} did not come to rest in {relaxation.steps} steps (a disk feels "
-            f"{relaxation.residual:.2g}); the last equilibrium is at F_x = {last.fx:.10g}"
-        )
+        says = f"the relaxation at F_x = {fx:.10g} did not come to rest in {relaxation.steps} steps"
+        feels = f"(a disk feels {relaxation.residual:.2g})"
+        raise NoEquilibriumError(f"{says} {feels}; the last equilibrium is at F_x = {last.fx:.10g}")
     packing = engine.packing
     return Equilibrium(packing, relaxation.residual, rounding_floor(packing), relaxation.steps)
 

@@ -100,10 +100,9 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     limit = float(stable_timestep(packing if packing.law.damped else largest_frequency(packing)))
     if wanted is not None and wanted >= limit:
         name = "with these dashpots" if packing.law.damped else "2/omega_max"
-        raise SceneError(
-            f"perturb.time_step = {wanted:g} is over the limit {name} = {limit:.4g} of this packing, above "
-            f"which every run blows up: lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
-        )
+        says = f"perturb.time_step = {wanted:g} is over the limit {name} = {limit:.4g} of this packing"
+        cure = f"lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
+        raise SceneError(f"{says}, above which every run blows up: {cure}")
     return ACCURATE_SHARE * limit if wanted is None else wanted
 
 

@@ -97,11 +97,8 @@ class Perturb(WithSignal, Inertia):
         What of the floor's motion the signal gives; None is its velocity.
     """
 
-    TAKES: ClassVar = {
-        None: "amplitude omega",
-        "pulse": "amplitude! omega! on quantity",
-        "file": "on quantity channel scale stretch",
-    }
+    TAKES: ClassVar = {None: "amplitude omega", "pulse": "amplitude! omega! on quantity"}
+    TAKES |= {"file": "on quantity channel scale stretch"}
 
     fx: Annotated[NotNegative | None, FORCE] = None
     time: Annotated[Positive, TIME]

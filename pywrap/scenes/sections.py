@@ -200,9 +200,7 @@ class Friction(Section):
     B: NotNegative = 0.2
     w: Positive = 0.4
     mu_ss: NotNegative = 0.8
-    v0: Annotated[NotNegative | Literal["calibrated"], rule('give a velocity, or "calibrated"'), VELOCITY] = (
-        "calibrated"
-    )
+    v0: Annotated[NotNegative | Literal["calibrated"], rule('give a velocity or "calibrated"'), VELOCITY] = "calibrated"
     v_ss: Annotated[Positive | str, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"'), VELOCITY]
 
     @field_validator("v_ss")

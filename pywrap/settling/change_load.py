@@ -59,10 +59,9 @@ def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = Non
                 here, found = minimize_energy(start)
                 here = here if found else settle_loose(engine, start, bed=False)
         if here.residual > FORCE_OF_MOTION * load:
-            raise NoEquilibriumError(
-                f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}, at "
-                f"{load:.6g}: choose packing.settle_at nearer to the load, or another seed"
-            )
+            says = f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}"
+            cure = "choose packing.settle_at nearer to the load, or another seed"
+            raise NoEquilibriumError(f"{says}, at {load:.6g}: {cure}")
     return here
 
 

@@ -45,10 +45,9 @@ def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilib
     """
     slipped = packing.law.frictional and bool(np.any(packing.contacts.slip))
     if not slipped and packing.fx != 0:
-        raise BadInputError(
-            f"without slips the disks rest without friction first, and F_x = {packing.fx:g} would push them along for "
-            "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
-        )
+        pushes = f"and F_x = {packing.fx:g} would push them along for ever"
+        cure = "leave --fx out, and raise F_x by `faultgouge ramp`."
+        raise BadInputError(f"without slips the disks rest without friction first, {pushes}: {cure}")
     with show_progress(watch):
         if slipped:
             with Engine(packing) as engine:
@@ -64,15 +63,11 @@ def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilib
             resting = replace(resting, law=packing.law, angle=packing.angle, mass=packing.mass)
     idle = len(idle_disks(resting))
     if idle > 0.5 * len(resting):
-        raise NoEquilibriumError(
-            f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing: choose a layer "
-            "that closes the box (--top), or a lower load (--fy)"
-        )
+        says = f"the upper layer sank through the bed, and {idle} of {len(resting)} disks carry nothing"
+        raise NoEquilibriumError(f"{says}: choose a layer that closes the box (--top), or a lower load (--fy)")
     with Engine(resting) as engine:
         found = equilibrate(engine, Equilibrium.of(resting), resting.fx)
     after = found.packing
     moved = np.hypot(*nearest_image(after.position - packing.position, after.box_length).T).max()
-    return found, (
-        f"brought to rest: the largest force on a disk was {largest_force(packing):.3g} and is {found.residual:.2g}; "
-        f"the farthest disk moved by {moved:.3g}"
-    )
+    forces = f"the largest force on a disk was {largest_force(packing):.3g} and is {found.residual:.2g}"
+    return found, f"brought to rest: {forces}; the farthest disk moved by {moved:.3g}"

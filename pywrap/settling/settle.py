@@ -111,10 +111,8 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
     if not isinstance(section, GeneratedPacking):
         packing = _in_arithmetic(section.packing(law, **load_of(scene)), scene.precision)
         if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
-            raise SceneError(
-                f"{section.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
-                f"fy = {scene.load.fy:g}: {CHECK_LOAD}"
-            )
+            feels = f"a disk feels {packing.residual:.3g} under fy = {scene.load.fy:g}"
+            raise SceneError(f"{section.file}: the packing is not in balance, {feels}: {CHECK_LOAD}")
         return packing
     kn, fy, at = law.kn, scene.load.fy, section.settle_at
     if at is not None:
@@ -133,11 +131,10 @@ def settle_bed(scene: Scene, mu: float | None = None, communicator: MPI.Comm | N
         if len(idle) <= 0.5 * len(packing):
             break
     else:
-        raise NoEquilibriumError(
-            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {len(idle)} of "
-            f"{len(packing)} disks carry nothing: without friction only a layer that closes the box stays on top, so "
-            f"{MORE_IN_LAYER}"
-        )
+        sank = f"the upper layer sank through the bed from each of {STARTS} loose starts"
+        why = "without friction only a layer that closes the box stays on top"
+        sank += f", and {len(idle)} of {len(packing)} disks carry nothing"
+        raise NoEquilibriumError(f"{sank}: {why}, so {MORE_IN_LAYER}")
     if not own.settle_friction:
         packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
     wanted = own_units(section, law, scene.load.fy)[2]

@@ -22,9 +22,8 @@ def show_pictures() -> None:
     shell = get_ipython()
     if shell is not None:
         pictures = shell.display_formatter.formatters["image/png"]
-        pictures.for_type_by_name(
-            "faultgouge.analysis.packing.packing", "Packing", lambda each: png(sys.modules["faultgouge"].draw(each))
-        )
+        of_packing = "faultgouge.analysis.packing.packing", "Packing"
+        pictures.for_type_by_name(*of_packing, lambda each: png(sys.modules["faultgouge"].draw(each)))
         # pyplot, where it is in use, shows figures in its own way
         if "matplotlib.pyplot" not in sys.modules:
             pictures.for_type_by_name("matplotlib.figure", "Figure", png)

@@ -172,10 +172,8 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> dict[str, Any]:
     candidates = [(each, spectrum(each.packing)) for each in run.equilibria if each.fx > run.fx_c]
     start, modes = max(candidates, key=lambda each: dominance(each[1]))
     if not dominance(modes):
-        raise SceneError(
-            f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
-            f"F_x = {run.fx_c:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
-        )
+        none = f"no load of the ramp lies in a window of complex eigenvalues, the first begins at F_x = {run.fx_c:.6g}"
+        raise SceneError(f"{none}: take a smaller ramp.step, so that a run above the onset has where to start")
     dt = time_step(start.packing)
     predicted = modes.growth_rate(dt)
     length = min(EFOLDS / predicted, MOST_RUN_STEPS * dt)
@@ -216,10 +214,8 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and weakened[0].windows[0].kind != "start" and fx <= weakened[0].fx_c:
-        return (
-            f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
-            "window between the two, and nothing to erupt."
-        )
+        lower = f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too"
+        return f"{lower}: no window between the two, and nothing to erupt."
     *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
     packing = start.packing
     modes = spectrum(packing)
@@ -246,50 +242,35 @@ def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered
         one, far = sorted((near[0], near[-1]), key=lambda pair: pair.epsilon)
         theory = float(np.sqrt(far.epsilon / one.epsilon))
         plateaus = {"measured": one.amplitude() / far.amplitude(), "theory": theory}
-    return (
-        found,
-        sensitive,
-        {
-            "fx": start.fx,
-            "v0": found.weakening.v0,
-            "v_ss": found.weakening.v_ss,
-            "largest_D": most,
-            "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
-            "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
-            **found.outcome,
-            "forecast": found.foreseen._asdict(),
-            "largest_D_of_the_control": found.largest("control")["control"] if below else None,
-            "rate_of_the_control": weakened_rate(below.packing, mu_ss) if below else None,
-            "linear_response_deviation": float(np.abs(strong["msd"] - response.msd).max() / strong["msd"].max()),
-            "smallest_mu": float(found.runs["erupting"]["friction"].min()),
-            "amplitude_exponent": sensitive.fit.exponent,
-            "amplitude_exponent_error": sensitive.fit.error,
-            "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
-            "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in near],
-            "plateaus": plateaus,
-        },
-    )
+    numbers = {
+        **{"fx": start.fx, "v0": found.weakening.v0, "v_ss": found.weakening.v_ss, "largest_D": most},
+        "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
+        "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
+        **found.outcome,
+        "forecast": found.foreseen._asdict(),
+        "largest_D_of_the_control": found.largest("control")["control"] if below else None,
+        "rate_of_the_control": weakened_rate(below.packing, mu_ss) if below else None,
+        "linear_response_deviation": float(np.abs(strong["msd"] - response.msd).max() / strong["msd"].max()),
+        "smallest_mu": float(found.runs["erupting"]["friction"].min()),
+        **{"amplitude_exponent": sensitive.fit.exponent, "amplitude_exponent_error": sensitive.fit.error},
+        "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
+        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in near],
+        "plateaus": plateaus,
+    }
+    return found, sensitive, numbers
 
 
 def summary_of(scene: Scene, runs: list[Onset], growth: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers for summary.json."""
-    fitted, ramps = growth["measured"], []
+    fitted, ramps = growth["measured"], list[dict[str, Any]]()
     for run in runs:
         first, *_, last = run.equilibria
-        ramps.append(
-            {
-                "mu": run.mu,
-                "equilibria": len(run.equilibria),
-                "evaluations": [each.evaluations for each in run.equilibria],
-                "largest_residual": max(each.residual for each in run.equilibria),
-                "floor": last.floor,
-                "contacts": len(first.packing.contacts),
-                "rattlers": first.packing.rattlers.tolist(),
-                "solid_fraction": solid_fraction(first.packing),
-                "flows_beyond": run.flows_beyond,
-                "onset": run.as_dict(),
-            }
-        )
+        row: dict[str, Any] = {"mu": run.mu, "equilibria": len(run.equilibria)}
+        row |= {"evaluations": [each.evaluations for each in run.equilibria]}
+        row |= {"largest_residual": max(each.residual for each in run.equilibria), "floor": last.floor}
+        row |= {"contacts": len(first.packing.contacts), "rattlers": first.packing.rattlers.tolist()}
+        row |= {"solid_fraction": solid_fraction(first.packing), "flows_beyond": run.flows_beyond}
+        ramps.append(row | {"onset": run.as_dict()})
     grows = {"fx": growth["start"].fx, "time_step": growth["time_step"], "predicted_rate": growth["predicted"]}
     grows |= {"measured": fitted and asdict(fitted), "deviation": fitted and fitted.rate / growth["predicted"] - 1}
     return {"scene": scene.resolved(), "ramps": ramps, "growth": grows}
@@ -316,15 +297,10 @@ def report(
     if real is not None and units is not None and units.restitution is not None:
         impact = units.si("impact_velocity") / real.velocity(1.0)
         names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)
-    return render(
-        __package__ or "",
-        "report.md.j2",
-        **{"scene": scene, "packing": settled, "ramp": scene.ramp, "runs": runs, "real": real, "growth": growth},
-        **{"last": runs[0].equilibria[-1], "earlier": earlier, "says": found, "another": another},
-        solid_fraction=(solid_fraction(settled), solid_fraction_below_top(settled)),
-        residual=max(each.residual for run in runs for each in run.equilibria),
-        above_noise=ABOVE_NOISE,
-        time_step_share=ACCURATE_SHARE,
-        settled_with_friction=getattr(scene.packing, "settle_friction", False),
-        **names,
-    )
+    names |= {"scene": scene, "packing": settled, "ramp": scene.ramp, "runs": runs, "real": real, "growth": growth}
+    names |= {"last": runs[0].equilibria[-1], "earlier": earlier, "says": found, "another": another}
+    names |= {"solid_fraction": (solid_fraction(settled), solid_fraction_below_top(settled))}
+    names |= {"residual": max(each.residual for run in runs for each in run.equilibria)}
+    names |= {"above_noise": ABOVE_NOISE, "time_step_share": ACCURATE_SHARE}
+    names |= {"settled_with_friction": getattr(scene.packing, "settle_friction", False)}
+    return render(__package__ or "", "report.md.j2", **names)

@@ -86,9 +86,8 @@ def friction_law_figure(law: Weakening, mu_0: float) -> Figure:
     figure, last = Figure(layout="constrained"), 5.5 / law.w
     axes = figure.add_subplot(xlabel="$(v - v_0)/v_{ss}$", ylabel=r"$\mu(v)$", xlim=(-0.1 * last, last))
     velocity = np.array([-0.1 * last, 0.0, np.nextafter(0.0, 1), *np.linspace(0, last, 400)[1:]])
-    axes.plot(
-        velocity, mu_0 * share(law, velocity), label=rf"$\mu_{{ss}} = {law.mu_ss:g}$, $B = {law.B:g}$, $w = {law.w:g}$"
-    )
+    label = rf"$\mu_{{ss}} = {law.mu_ss:g}$, $B = {law.B:g}$, $w = {law.w:g}$"
+    axes.plot(velocity, mu_0 * share(law, velocity), label=label)
     axes.axhline(mu_0 * law.mu_ss, color=INK, linewidth=0.6, linestyle=":")
     axes.legend(loc="upper right", title=rf"$\mu_0 = {mu_0:g}$")
     return figure

@@ -86,9 +86,8 @@ def sweep(
     [1.935965, 1.672051]
     """
     if not isinstance(request, str | Path | Mapping):
-        raise SceneError(
-            f"sweep takes the path of a SWEEP.toml, or a mapping as in it, and no {type(request).__name__}."
-        )
+        wrong = type(request).__name__
+        raise SceneError(f"sweep takes the path of a SWEEP.toml, or a mapping as in it, and no {wrong}.")
     wanted = Sweep.from_mapping(request) if isinstance(request, Mapping) else Sweep.from_toml(request)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
 
@@ -205,10 +204,8 @@ def read_results(*paths: Path) -> dict[str, Row]:
                 rows[key], places[key] = row, path
             elif row["says"] is None and _as_text(row["result"]) != _as_text(known["result"]):
                 values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
-                raise SceneError(
-                    f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
-                    "line of the wrong one out"
-                )
+                two = f"{places[key]} and {path} have different results of one scene ({values}; key {key})"
+                raise SceneError(f"{two}: take the line of the wrong one out")
     return rows
 
 
@@ -272,14 +269,11 @@ def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
             same = {name: request[name] for name in ("version", "task", "sweep", "keys")}
             first = first or same | {"scene": request["scene"]} | request
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
-            raise SceneError(
-                f"{folder} is no folder of a sweep, or of version 1.0.0 or before ({type(error).__name__}: {error}): "
-                "give folders of `faultgouge sweep`"
-            ) from None
+            says = f"{folder} is no folder of a sweep, or of version 1.0.0 or before ({type(error).__name__}: {error})"
+            raise SceneError(f"{says}: give folders of `faultgouge sweep`") from None
         for name, value in same.items():
             if value != first[name]:
-                raise SceneError(
-                    f"{folder} is of another sweep than {folders[0]}, of other scenes, other code or another version "
-                    f"({name} differs): merge parts of one sweep, into a new folder or one of this sweep"
-                )
+                other = f"another sweep than {folders[0]}, of other scenes, other code or another version"
+                cure = "merge parts of one sweep, into a new folder or one of this sweep"
+                raise SceneError(f"{folder} is of {other} ({name} differs): {cure}")
     return first or {}

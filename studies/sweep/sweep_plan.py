@@ -195,9 +195,8 @@ def _values(key: str, values: Any, name: str) -> list[Any]:
     if isinstance(values, str) and (match := re.fullmatch(r"\s*(\d{1,7})\s*:\s*(\d{1,7})\s*", values)):
         values = list(range(int(match[1]), int(match[2]) + 1))
     if not isinstance(values, list) or not values:
-        raise SceneError(
-            f'{name}: "{key}" = {values!r} is refused: give a list of values, or a range "FIRST:LAST", both included.'
-        )
+        cure = 'give a list of values, or a range "FIRST:LAST", both included'
+        raise SceneError(f'{name}: "{key}" = {values!r} is refused: {cure}.')
     count = len(_split_keys(key))
     if count > 1 and not all(isinstance(each, list) and len(each) == count for each in values):
         raise SceneError(f'{name}: "{key}" names {count} keys: each value is a list of {count}.')

@@ -90,9 +90,8 @@ def user_function(name: str) -> UserFunction:
     parameters = inspect.signature(function).parameters.values()
     count = sum(each.kind in POSITIONAL and each.default is inspect.Parameter.empty for each in parameters)
     if count not in (1, 2):
-        raise SceneError(
-            f'task = "{name}": {wanted} takes {count} arguments: a task is {wanted}(scene) or {wanted}(scene, settled)'
-        )
+        cure = f"a task is {wanted}(scene) or {wanted}(scene, settled)"
+        raise SceneError(f'task = "{name}": {wanted} takes {count} arguments: {cure}')
     return UserFunction(function, count == 2, code)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, eye_array
 
-from faultgouge.analysis import Configuration, LinearisedContacts
-from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
+from faultgouge.analysis import Contacts, MindlinLaw, Packing
+from faultgouge.analysis.arrays import derive_frozen
 
 
 def turned(blocks, rng):
@@ -31,12 +31,7 @@ def complex_block(real, imaginary):
 
 def of_stiffness(matrix, damping=None):
     """Disks of unit masses with this K and C, whose contacts are not known."""
-    count = matrix.shape[0] // 3
-    each, kinds = np.ones(count), dict.fromkeys(PER_CONTACT, float) | dict.fromkeys("ij", int)
-    kinds |= dict.fromkeys(BOOLEAN, bool)
-    contacts = LinearisedContacts(**{name: np.zeros((0, *shape), kinds[name]) for name, shape in PER_CONTACT.items()})
-    return Configuration(
-        dimension=2, position=np.zeros((count, 2)), radius=each, mass=each, inertia=each, contacts=contacts,
-        box=np.eye(3), origin=np.zeros(3), periodic=np.zeros(3, bool), load=np.zeros((count, 2, 3)), stiffness=matrix,
-        damping=csr_array(matrix.shape) if damping is None else damping,
-    )  # fmt: skip
+    count, none = matrix.shape[0] // 3, csr_array(matrix.shape)
+    law, contacts = MindlinLaw(1.0, 1.0, 1.0), Contacts([], [], [])
+    disks = Packing(position=np.zeros((count, 2)), radius=np.ones(count), contacts=contacts, law=law).configuration
+    return derive_frozen(disks, stiffness=matrix, damping=none if damping is None else damping)

@@ -7,6 +7,7 @@ import pytest
 import quasistatic
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from table_rows import rows_of
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, solid_fraction, touching
 
@@ -16,10 +17,8 @@ LAW = MindlinLaw(2e5, 6e4, 1.0)
 def test_contacts_have_one_order_also_with_other_slips():
     contacts = Contacts([3, 0, 2, 1, 4], [1, -1, 0, -1, 0], [0.1, 0.2, 0.3, 0.4, 0.5])
     other = contacts.slipped(np.arange(5), 1e-17 * np.arange(5))
-    for one in (contacts, other):
-        np.testing.assert_array_equal(one.i, [0, 0, 1, 0, 1])
-        np.testing.assert_array_equal(one.j, [2, 4, 3, -1, -1])
-    np.testing.assert_array_equal(contacts.slip, [0.3, 0.5, 0.1, 0.2, 0.4])
+    assert [*map(list, (contacts.i, contacts.j))] == [[0, 0, 1, 0, 1], [2, 4, 3, -1, -1]]
+    assert list(contacts.slip) == [0.3, 0.5, 0.1, 0.2, 0.4]
     assert other == Contacts(other.i, other.j, np.arange(5), 1e-17 * np.arange(5))
     for slips in ([1.0], [1.0, 2.0, 3.0, 4.0, np.inf]):
         with pytest.raises(ValueError, match="slip"):
@@ -47,49 +46,19 @@ def test_a_packing_is_frozen(cluster):
             setattr(cluster, name, getattr(cluster, name))
     given = np.array(cluster.position)
     moved = cluster.moved(given, cluster.angle, cluster.contacts)
-    for array in (cluster.angle, cluster.geometry.overlap, moved.position, cluster.contacts.slipped(np.zeros(12)).slip):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1.0
     given[0] += 7
     assert moved == cluster
+    for array in (cluster.angle, cluster.geometry.overlap, moved.position, cluster.contacts.slipped(np.zeros(12)).slip):
+        assert not array.flags.writeable
 
 
-@pytest.mark.parametrize(
-    ("i", "j", "slip", "says"),
-    [
-        ([0, 1], [1], [0, 0], "2 integers"),
-        ([0], [1], [np.nan], "finite"),
-        ([-1], [1], [0], "negative"),
-        ([0], [-2], [0], "negative"),
-        ([2], [2], [0], "itself"),
-        ([0, 1], [1, 0], [0, 0], "twice"),
-        ([0, 0], [-1, -1], [0, 0], "twice"),
-        ([0.5], [1], [0], "integers"),
-    ],
-)
+@pytest.mark.parametrize(("i", "j", "slip", "says"), rows_of("analysis/refused_contacts.txt"))
 def test_impossible_contacts(i, j, slip, says):
     with pytest.raises(ValueError, match=says):
         Contacts(i, j, slip)
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"position": [[0, 0]]}, "shape"),
-        ({"position": np.full((6, 2), np.nan)}, "finite"),
-        ({"radius": [1, 1, 1, 1, 1, -1]}, "positive"),
-        ({"mass": [1, 1, 1, 1, 1, 0]}, "positive"),
-        ({"angle": [0.0]}, "shape"),
-        ({"top": [0, 1, 2]}, "booleans"),
-        ({"top": [True]}, "booleans"),
-        ({"inertia_factor": 0.0}, "inertia_factor"),
-        ({"box_length": -1.0}, "box_length"),
-        ({"box_length": 1.99}, "two largest diameters"),
-        ({"fx": np.inf}, "fx"),
-        ({"contacts": Contacts([0], [6], [0.0])}, "beyond"),
-        ({"position": [[0, 1]] * 6}, "same centre"),
-    ],
-)
+@pytest.mark.parametrize(("change", "says"), rows_of("analysis/refused_packings.txt", Contacts=Contacts))
 def test_impossible_packings(cluster, change, says):
     with pytest.raises(ValueError, match=says):
         _ = replace(cluster, **change).geometry
@@ -105,10 +74,9 @@ def test_residual_leaves_out_rattlers_of_the_upper_layer():
     position, contacts = [[0, 0.5], [5, 3]], Contacts([0], [-1], [0])
     packing = Packing(position=position, radius=[0.5] * 2, top=[True] * 2, fy=3.0, contacts=contacts, law=LAW)
     # An open contact is none: a disk that only touches at a point is a rattler too.
-    np.testing.assert_array_equal(packing.rattlers, [0, 1])
-    assert packing.residual == 0
+    assert (list(packing.rattlers), packing.residual) == ([0, 1], 0)
     pressed = replace(packing, position=[[0, 0.4], [5, 3]])
-    np.testing.assert_array_equal(pressed.rattlers, [1])
+    assert list(pressed.rattlers) == [1]
     assert pressed.residual == pytest.approx(2e5 * 0.1**1.5 - 3, rel=1e-14)
 
 
@@ -117,9 +85,9 @@ def test_solid_fraction_is_the_share_of_points_below_the_layer_that_lie_in_disks
     position, top = [[0.5, 0.5], [1.9, 0.7], [0.7, 1.6], [2.3, 1.8], [1.4, 3.0]], [False, False, True, True, False]
     radius, none = [0.5, 0.7, 0.5, 0.3, 0.4], Contacts([], [], [])
     packing = Packing(position=position, radius=radius, top=top, contacts=none, law=LAW, box_length=3.0)
-    x, y = np.meshgrid(np.arange(0.0005, 3.0, 1e-3), np.arange(0.0005, 1.7, 1e-3))
+    x, y = np.meshgrid(np.arange(0.001, 3.0, 2e-3), np.arange(0.001, 1.7, 2e-3))
     inside = sum((x - c) ** 2 + (y - d) ** 2 < r**2 for (c, d), r in zip(packing.position, packing.radius, strict=True))
-    # a grid of 1e-3 misses a perimeter of 14 by a hundredth of its width
+    # a grid of 2e-3 misses a perimeter of 14 by a hundredth of its width
     assert solid_fraction(packing) == pytest.approx(inside.mean(), abs=1e-4)
     # without a period the width is that of the disks, 2.6 here
     assert solid_fraction(replace(packing, box_length=None)) == pytest.approx(inside.mean() * 3.0 / 2.6, abs=1e-4)
@@ -137,7 +105,6 @@ def test_touching_finds_what_all_pairs_have(seed, periodic):
     expected = [(i, -1) for i in range(n) if position[i, 1] < radius[i]]
     i, j = np.triu_indices(n, 1)
     touch = np.linalg.norm(quasistatic.branches(position, box_length, i, j), axis=1) < radius[i] + radius[j]
-    expected += zip(i[touch].tolist(), j[touch].tolist(), strict=True)
-    contacts = touching(position, radius, box_length)
-    assert sorted(expected) == sorted(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
-    assert not contacts.slip.any()
+    expected += zip(i[touch], j[touch], strict=True)
+    found = touching(position, radius, box_length)
+    assert found == Contacts(*zip(*expected, strict=True), np.zeros(len(expected)))

@@ -99,8 +99,7 @@ def test_disks_of_a_drive_are_greener_the_farther_they_have_moved(packing):
 def test_mp4_plays_and_has_1080_lines_without_dots(tmp_path, motion):
     """The usual film where imageio-ffmpeg is installed; an even number of dots, as its codec asks."""
     width, height = film_of_run(motion, 2, dots=None).size
-    assert 1080 <= height < 1100
-    assert (width % 2, height % 2) == (0, 0)
+    assert (1080 <= height < 1100, width % 2, height % 2) == (True, 0, 0)
     assert usual_suffix() == (".mp4" if find_spec("imageio_ffmpeg") else ".gif")
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra `movie` is not installed")
     write_film(film_of_run(motion, 5, dots=60), tmp_path / "run.mp4", 10)

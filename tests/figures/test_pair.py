@@ -1,46 +1,26 @@
 """The curve of a pair of eigenvalues between stored loads."""
 
 import numpy as np
-import pytest
-from reference_layer import SMALL
 
 from faultgouge.figures import PairCurve, draw_pair
-from faultgouge.figures.followed_pairs import follow_eigenvalues
 from faultgouge.figures.pair import curve_through
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset import onset_run
 
 
-@pytest.fixture(scope="module")
-def run():
-    """The first window on a ramp of 17 loads, the loads, and the eigenvalues of its pair."""
-    changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
-    found = onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
-    first, packings = found.windows[0], [each.packing for each in found.equilibria]
-    pairs = follow_eigenvalues(packings).pairs
-    pair = min(pairs, key=lambda each: np.nanmin(np.abs(each.eigenvalues.real - first.eigenvalue)))
-    return first, np.array([each.fx for each in packings]), pair.eigenvalues
-
-
-@pytest.mark.slow
-def test_the_drawn_branches_meet_at_the_onset(run):
-    """To a pixel of a picture; the onset itself is the root of the discriminant, solved for with equilibria close to
-    it."""
-    first, fx, eigenvalues = run
-    curve = PairCurve(1.0, fx, eigenvalues, first.fx_onset)
+def test_the_pair_over_the_load_has_both_members_which_meet_at_the_onset():
+    """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx). Its discriminant is linear, so that curves between a few loads
+    are exact, and both branches meet at the onset."""
+    fx, fx_c = np.linspace(0, 0.03, 8), 0.02
+    root = np.sqrt(fx_c - fx + 0j)
+    curve = PairCurve(1.0, fx, np.column_stack([1 + root, 1 - root]), fx_c)
     real, imaginary = draw_pair([curve]).axes[:2]
-    for axes in (real, imaginary):
-        figure = axes.figure
-        figure.draw_without_rendering()
-        lower, upper = (line.get_xydata() for line in axes.lines[:2])
-        apart = np.abs(lower - upper)[:, 1]
-        real_pair = curve.smooth().eigenvalues[:, 0].imag == 0
-        # the last real load and the first complex one are one point, where both branches are
-        meeting = np.flatnonzero(real_pair)[-1]
-        assert apart[meeting] <= (1e-12 if axes is real else 0.0) * np.abs(lower).max()
-        drawn = axes.transData.transform(lower[meeting])
-        there = axes.transData.transform((first.fx_onset, lower[meeting, 1]))
-        assert abs(drawn - there).max() < 1.0
+    for axes, part in ((real, np.real), (imaginary, np.imag)):
+        for sign, line, dots in zip((-1, 1), axes.lines[:2], axes.lines[2:4], strict=True):
+            for drawn in (line, dots):
+                at, value = drawn.get_xydata()[np.isfinite(drawn.get_ydata())].T
+                wanted = np.sort([part(1 + s * np.sqrt(fx_c - at + 0j)) for s in (-1, 1)], axis=0)[(sign + 1) // 2]
+                np.testing.assert_allclose(value, wanted, atol=1e-8)  # the root of what rounding leaves of D
+            np.testing.assert_array_equal(dots.get_xdata(), fx)
+            assert np.abs(line.get_xdata() - fx_c).min() < 1e-12
 
 
 def test_nothing_is_drawn_between_two_loads_of_which_one_is_unknown_and_a_falling_load_has_the_same_curve():

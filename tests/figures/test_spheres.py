@@ -18,8 +18,7 @@ def test_the_nearer_sphere_hides_the_other_in_any_order():
     for order in ([0, 1], [1, 0]):
         dots = shade_spheres(place[order], np.full(2, 0.4), np.array([RED, BLUE])[order], FRAME)
         red, _, blue, opaque = dots[len(dots) // 2, DOTS_ACROSS // 2]
-        assert blue > red
-        assert opaque == 1
+        assert (blue > red, opaque) == (True, 1)
     assert dots[0, 0, 3] == 0  # beside the spheres there is nothing
 
 

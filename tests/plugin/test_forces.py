@@ -1,7 +1,5 @@
 """Forces in LAMMPS: how slips are counted, and K against differences; test_damping.py has the law in ten lines."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,14 +7,14 @@ from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix
 from faultgouge.pywrap.lammps.engine import Engine
 
 
-def two_disks(distance, mu, contacts, radius=(0.5, 0.5)):
+def two_disks(distance, radius, *contacts):
     """One above the other."""
-    law = MindlinLaw(2e5, 2e5 * 2 / 7, mu)
-    return Packing(position=[[1.0, 3.0], [1.0, 3.0 + distance]], radius=radius, law=law, contacts=contacts)
+    law, position = MindlinLaw(2e5, 2e5 * 2 / 7, 100.0), [[1.0, 3.0], [1.0, 3.0 + distance]]
+    return Packing(position=position, radius=radius, law=law, contacts=Contacts(*contacts))
 
 
 def test_slip_is_taken_along_the_tangent_at_the_middle_of_the_step():
-    packing = two_disks(1.19, 100.0, Contacts([0], [1], [0.0]), radius=(0.5, 0.7))
+    packing = two_disks(1.19, [0.5, 0.7], [0], [1], [0.0])
     displacement = 1e-3 * np.random.default_rng(1).standard_normal(6)
     with Engine(packing) as engine:
         moved = engine.displace(packing, displacement)
@@ -28,7 +26,7 @@ def test_slip_is_taken_along_the_tangent_at_the_middle_of_the_step():
 
 
 def test_new_contact_starts_without_slip_and_lost_one_forgets():
-    packing = two_disks(1.001, 1.0, Contacts([], [], []))
+    packing = two_disks(1.001, [0.5, 0.5], [], [], [])
     together = np.array([1e-4, 0.0, 0.0, -2e-3, 0.0, 0.0])
     with Engine(packing) as engine:
         closed = engine.displace(packing, together)
@@ -66,12 +64,6 @@ def differences(packing, sign):
     return matrix
 
 
-def with_slips(packing, fractions):
-    """The packing with slips that are the given fractions of the Coulomb limit in turn."""
-    slip = np.resize(fractions, len(packing.contacts)) * packing.law.slip_limit(packing.geometry.overlap)
-    return replace(packing, contacts=packing.contacts.slipped(slip))
-
-
 @pytest.mark.parametrize("exponent", [1.5, 1.0], ids=["Hertz", "harmonic"])
 @pytest.mark.parametrize(
     ("mu", "fractions"),
@@ -79,8 +71,7 @@ def with_slips(packing, fractions):
     ids=["sticking", "all kinds", "sliding"],
 )
 def test_consistent_form_is_the_derivative_of_the_forces(reference_packing, mu, fractions, exponent):
-    packing = reference_packing(mu)
-    packing = with_slips(replace(packing, law=replace(packing.law, exponent=exponent)), fractions)
+    packing = reference_packing(mu, shares=fractions, exponent=exponent)
     assert packing.contacts.floor.any()
     matrix, central = stiffness_matrix(packing).toarray(), (differences(packing, 1) + differences(packing, -1)) / 2
     # A force is rounded at K * 1e-16, which a difference divides by STEP: 1e-8 of K; a disk has several contacts, and
@@ -104,18 +95,13 @@ KINDS = [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1]
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(
     ("mu", "law"),
-    [
-        (0.3, {"coulomb": True}),
-        (1.0, {"coulomb": True, "exponent": 1.0}),
-        (1.0, {"rescaled": True}),
-        (0.3, {"rescaled": True}),
-    ],
+    [(0.3, {"coulomb": True}), (1.0, {"coulomb": True, "exponent": 1.0})]
+    + [(mu, {"rescaled": True}) for mu in (1.0, 0.3)],
     ids=["slider", "harmonic slider", "rescaled", "rescaled, mostly at the bound"],
 )
 def test_matrix_is_the_one_sided_derivative(reference_packing, mu, law, sign):
     """Of each contact what a displacement asks for: it closes or parts, and a slider at the bound slides or sticks."""
-    packing = reference_packing(mu)
-    packing = with_slips(replace(packing, law=replace(packing.law, **law)), KINDS)
+    packing = reference_packing(mu, shares=KINDS, **law)
     difference, law, slip = differences(packing, sign), packing.law, packing.contacts.slip
     matrix, seen = np.empty_like(difference), np.zeros(4)
     for k, column in enumerate(sign * np.eye(len(matrix))):
@@ -139,7 +125,6 @@ def test_matrix_is_the_one_sided_derivative(reference_packing, mu, law, sign):
 
 
 def test_parting_with_rescaled_slips_is_as_with_total_ones(reference_packing):
-    packing = with_slips(reference_packing(0.3), KINDS)
-    rescaled = replace(packing, law=replace(packing.law, rescaled=True))
+    rescaled, packing = (reference_packing(0.3, shares=KINDS, rescaled=each) for each in (True, False))
     parting, total = stiffness_matrix(rescaled, parting=1.0).toarray(), stiffness_matrix(packing).toarray()
     np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(total).max())  # b is summed otherwise

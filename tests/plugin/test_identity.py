@@ -27,6 +27,10 @@ KINDS = {
 }
 
 
+UNCHANGED = {}
+"""Trajectories of each kind without a change."""
+
+
 # the last kind is compensated, too
 @pytest.fixture(params=[pytest.param(kind, marks=[pytest.mark.long] * (kind == "compensated")) for kind in KINDS])
 def variables(request):
@@ -42,21 +46,20 @@ def trajectory(lmp, tmp_path, variables):
     return run
 
 
-@pytest.fixture(scope="module")
-def known():
-    """Trajectories of each kind, as they are without a change."""
-    return {}
-
-
 @pytest.fixture
-def unchanged(trajectory, request, known):
+def unchanged(trajectory, variables):
     """The trajectory without a change."""
-    kind = request.node.callspec.params["variables"]
-    if kind not in known:
-        known[kind] = trajectory()
-    return known[kind]
+    kind = str(variables)
+    UNCHANGED[kind] = UNCHANGED.get(kind) or trajectory()
+    return UNCHANGED[kind]
 
 
+ACTS = {
+    None: "",
+    "weaken": f"variable v0 index 0.01\nvariable v_ss index 1.0\ninclude {DECKS}/weaken.in",
+    "spring": "fix drive top drive/spring 50.0 protocol 3 0.6 0 0.6 -3 10\n",
+}
+"""What acts on the layer, beside a signal on the layer or the floor."""
 AGAIN = f"{RESTART}clear\nvariable restart index middle.restart\n{START}"
 LOOKS = """
 compute         seen all pair/local p1 p2 p3 p4 p5 p6 p7 cutoff radius
@@ -85,30 +88,16 @@ def test_same_trajectory(trajectory, unchanged, changes):
 @pytest.mark.ranks
 @pytest.mark.parametrize(
     ("ranks", "acts"),
-    [
-        (1, None),
-        pytest.param(2, None, marks=pytest.mark.long),
-        (1, "layer"),
-        pytest.param(1, "floor", marks=pytest.mark.long),
-        pytest.param(1, "weaken", marks=pytest.mark.long),
-        (2, "weaken"),
-        (1, "spring"),
-    ],
+    [(1, None), (1, "layer"), (2, "weaken"), (1, "spring")]
+    + [pytest.param(*each, marks=pytest.mark.long) for each in ((2, None), (1, "floor"), (1, "weaken"))],
 )
 @pytest.mark.slow
 def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_path, ranks, acts):
     """Without more; with a signal, which goes by the time of the run, which a restart file keeps; with friction that
     has weakened, which the file keeps as the last forces had it; and with a spring, whose protocol counts from the
     beginning."""
-    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(21))
-    (tmp_path / "wave.txt").write_text("\n".join(rows))
-    extra = ""
-    if acts == "weaken":
-        extra = f"variable v0 index 0.01\nvariable v_ss index 1.0\ninclude {DECKS}/weaken.in"
-    elif acts == "spring":
-        extra = "fix drive top drive/spring 50.0 protocol 3 0.6 0 0.6 -3 10\n"
-    elif acts:
-        extra = f"variable signal index wave.txt\nvariable on index {acts}\ninclude {DECKS}/signal.in"
+    (tmp_path / "wave.txt").write_text("\n".join(f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(21)))
+    extra = ACTS.get(acts, f"variable signal index wave.txt\nvariable on index {acts}\ninclude {DECKS}/signal.in")
     straight = trajectory(ranks=ranks, extra=extra, middle=RESTART)
     (tmp_path / "end").unlink()
     lmp(START + extra + SECOND, ranks=3 - ranks, restart="middle.restart", **variables)

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-SOURCES = Path(__file__).parents[2] / "pair_mindlin_smooth"
+SOURCE = Path(__file__).parents[2] / "pair_mindlin_smooth" / "mindlinsmoothplugin.cpp"
 LAMMPS = "{:0>4}{:0>2}{:0>2}".format(*distribution("lammps").version.split(".")[:3])
+THIS = f"-DFAULTGOUGE_LAMMPS_VERSION={LAMMPS}"
 OPEN_MPI = "#include_next <mpi.h>\n#undef MPICH_VERSION\n#define OPEN_MPI 1\n"
 
 CASES = {
@@ -17,12 +18,11 @@ CASES = {
         f"was compiled for LAMMPS 20230802 and does not work with LAMMPS {LAMMPS}:",
     ),
     "other sizes": (
-        [f"-DFAULTGOUGE_LAMMPS_VERSION={LAMMPS}", "-DLAMMPS_BIGBIG"],
-        "was compiled for atom IDs of 64 bits and does not work with this LAMMPS, whose IDs have 32 "
-        "(-DLAMMPS_SIZES=smallbig or bigbig):",
+        [THIS, "-DLAMMPS_BIGBIG"],
+        "for atom IDs of 64 bits and does not work with this LAMMPS, whose IDs have 32 (-DLAMMPS_SIZES=smallbig",
     ),
     "another MPI": (
-        [f"-DFAULTGOUGE_LAMMPS_VERSION={LAMMPS}", "-DLAMMPS_SMALLBIG", "-Iopen_mpi"],
+        [THIS, "-DLAMMPS_SMALLBIG", "-Iopen_mpi"],
         "was compiled for the MPI of Open MPI and does not work with this LAMMPS, whose MPI is MPICH",
     ),
 }
@@ -37,20 +37,18 @@ CASES = {
 def test_it_says_what_does_not_fit(lmp, tmp_path, flags, says):
     lammps, mpich = distribution("lammps"), distribution("mpich")
     mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent
-    headers = f"-isystem{lammps.locate_file('lammps/include/lammps')}", f"-isystem{mpi}"
-    command = shutil.which("g++") or shutil.which("c++")
-    compiler = [command, "-std=c++17", "-O0", "-fPIC", "-DMPICH_SKIP_MPICXX", *headers]
+    compiler = [shutil.which("g++") or shutil.which("c++"), "-std=c++17", "-O0", "-fPIC", "-DMPICH_SKIP_MPICXX"]
+    compiler += [f"-isystem{lammps.locate_file('lammps/include/lammps')}", f"-isystem{mpi}"]
     (tmp_path / "open_mpi").mkdir()
     (tmp_path / "open_mpi" / "mpi.h").write_text(OPEN_MPI)
-    built, plugin = tmp_path / "other.o", tmp_path / "otherplugin.so"
-    registers = [*compiler, *flags, "-c", SOURCES / "mindlinsmoothplugin.cpp", "-o", built]
-    weaken = ["objcopy", "--weaken", built]  # the styles that it would register need not be there
-    link = [*compiler, "-shared", built, "-Wl,--wrap=_ZSt28__throw_bad_array_new_lengthv", "-o", plugin]
-    for command in (registers, weaken, link):
+    for command in (
+        [*compiler, *flags, "-c", SOURCE, "-o", "other.o"],
+        ["objcopy", "--weaken", "other.o"],  # the styles that it would register need not be there
+        [*compiler, "-shared", "other.o", "-Wl,--wrap=_ZSt28__throw_bad_array_new_lengthv", "-o", "otherplugin.so"],
+    ):
         subprocess.run(command, cwd=tmp_path, check=True)
-    done = lmp(
-        f"plugin unload pair mindlin/smooth\nplugin load {plugin}\npair_style mindlin/smooth 1 1 1\n", fails=True
-    )
+    load = f"plugin unload pair mindlin/smooth\nplugin load {tmp_path / 'otherplugin.so'}\n"
+    done = lmp(f"{load}pair_style mindlin/smooth 1 1 1\n", fails=True)
     (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "the faultgouge plugin" in line)
     assert says in line
     assert "build it for this LAMMPS: pip install --no-build-isolation" in line

@@ -11,16 +11,9 @@ from table_rows import rows_of
 from faultgouge.pywrap.lammps.instance import lammps_instance
 
 MODEL = Path(__file__).with_name("inputs").joinpath("refused.in").read_text()
-GOOD = {
-    "dimension": 2,
-    "vel": "comm_modify vel yes",
-    "width": 8,
-    "pair": "pair_style mindlin/smooth 2e5 5e4 1.0",
-    "coeff": "pair_coeff * *",
-    "fix": "fix 1 all nve/disc 1.0",
-    "run": "run 10",
-}
 NVE = "fix 1 all nve/disc 1.0 "
+GOOD = {"pair": "pair_style mindlin/smooth 2e5 5e4 1.0", "coeff": "pair_coeff * *", "fix": NVE, "run": "run 10"}
+GOOD |= {"dimension": 2, "vel": "comm_modify vel yes", "width": 8}
 DELETE = "run 0\ngroup one id 1\ndelete_atoms group one {}\nrun 10"
 WORDS = {
     "PAIR": "pair_style mindlin/smooth 2e5 ",
@@ -48,15 +41,11 @@ def test_refused(change, says):
         instance.commands_string(MODEL.format(**{**GOOD, **change}))
 
 
-@pytest.mark.parametrize("run", ["run 10", DELETE.format("compress no")])
-def test_model_of_the_refusals_runs(lmp, run):
-    """Also where disks are deleted that leave the slips of the others."""
-    lmp(MODEL.format(**{**GOOD, "run": run}))
-
-
 @pytest.mark.slow
 def test_the_layout_of_another_version_is_refused(lmp, tmp_path):
-    """A restart file whose slips have another layout; one of this layout is read."""
+    """A restart file whose slips have another layout; one of this layout is read. The model of the refusals runs, and
+    disks may be deleted that leave the slips of the others."""
+    lmp(MODEL.format(**{**GOOD, "run": DELETE.format("compress no")}))
     state, mark = tmp_path / "state.restart", (0x4D444C53).to_bytes(4, "little")
     lmp(MODEL.format(**{**GOOD, "run": "run 0\nunfix 1\nwrite_restart state.restart"}))
     lmp("read_restart state.restart\nrun 0\n")

@@ -21,8 +21,7 @@ DUMP = "fix still all displace/disc\nrun 0\nwrite_dump all custom seen.dump id x
 RERUN = f"{MODEL}{DUMP}rerun seen.dump dump x y\n"
 MINIMIZE, STILL = "minimize 0 1e-3 10 10\n", "fix still all displace/disc\nrun 0\n"
 GROWS = "variable d equal 1.0+step*dt\nfix grow all adapt 1 atom diameter v_d\nfix move all nve/disc 1.0\nrun 1\n"
-NAMES = ("FRICTIONLESS", "MODEL", "ALONE", "GROWING", "RERUN", "MINIMIZE", "STILL", "GROWS")
-REFUSED = rows_of("plugin/refused_run_styles.txt", **{name: globals()[name] for name in NAMES})
+REFUSED = rows_of("plugin/refused_run_styles.txt", **{name: each for name, each in globals().items() if name.isupper()})
 
 
 @pytest.mark.parametrize(("parts", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
@@ -46,10 +45,6 @@ SERVED = {
 MOVES = f"{FRICTIONLESS}{MODEL}fix move all nve/disc 1.0\n"
 
 
-def dumped(path):
-    return np.loadtxt(path, skiprows=9)
-
-
 @pytest.mark.parametrize("case", SERVED)
 @pytest.mark.slow
 def test_after_a_command_forces_are_those_of_a_new_instance(lmp, tmp_path, case):
@@ -57,7 +52,7 @@ def test_after_a_command_forces_are_those_of_a_new_instance(lmp, tmp_path, case)
     write = "run 0\nwrite_dump all custom {}.dump id x y fx fy modify sort id format float %.17g\n"
     lmp(f"{MOVES}run 20\n{SERVED[case]}\n{write.format('one')}write_data left.data\n")
     lmp(MOVES + write.format("new"), data="left.data")
-    one, new = (dumped(tmp_path / f"{name}.dump") for name in ("one", "new"))
+    one, new = (np.loadtxt(tmp_path / f"{name}.dump", skiprows=9) for name in ("one", "new"))
     assert np.array_equal(one, new)
     assert len(one) == (99 if case == "delete_atoms" else 100)
     assert np.abs(one[:, 3:]).max() > (0 if case == "minimize" else 1e-3)  # the command has changed something

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from faultgouge.analysis import Packing
-
 sys.path.insert(0, str(Path(__file__).parent / "granular"))  # granular_packings
 
 
@@ -30,17 +28,17 @@ def refused_scene() -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
-def loaded(reference_packing) -> Callable[..., Packing]:
-    """The reference packing in equilibrium under F_x, reached in increments of the size that is given, for mu = 1."""
+def climbed(reference_packing) -> Callable[..., list]:
+    """Equilibria of the reference packing under F_x = increment, 2 increments, ..., for a friction coefficient."""
     from faultgouge.assessment.extremes.packings import at_rest
     from faultgouge.pywrap import Engine, equilibrate
 
     @cache
-    def make(fx: float, increment: float = 1e-3) -> Packing:
-        here = at_rest(reference_packing(1.0))
-        with Engine(here.packing) as engine:
+    def make(fx: float, increment: float = 1e-3, mu: float = 1.0) -> list:
+        path = [at_rest(reference_packing(mu))]
+        with Engine(path[0].packing) as engine:
             for k in range(1, round(fx / increment) + 1):
-                here = equilibrate(engine, here, k * increment)
-        return here.packing
+                path.append(equilibrate(engine, path[-1], k * increment))
+        return path[1:]
 
     return make

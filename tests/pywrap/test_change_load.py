@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from reference_layer import SMALL
 
@@ -15,10 +15,8 @@ from faultgouge.pywrap.settling.settle import settle_bed
 
 
 def scene(fy=3.0, kn=2e5, **packing):
-    return Scene.from_mapping(
-        SMALL | {"packing": SMALL["packing"] | packing, "law": {"kn": kn, "mu": 0.5}, "load": {"fy": fy}},
-        command="settle",
-    )
+    changed = {"packing": SMALL["packing"] | packing, "law": {"kn": kn, "mu": 0.5}, "load": {"fy": fy}}
+    return Scene.from_mapping(SMALL | changed, command="settle")
 
 
 def farthest(one, other):
@@ -32,12 +30,10 @@ def farthest(one, other):
 @given(st.floats(1e-6, 1e6), st.floats(-3, 3), st.floats(-3, 3))
 def test_loads_lie_on_one_grid(first, here, there):
     """The loads on the way to one load are loads on the way to any beyond it."""
-    near, far = sorted((first * 10**here, first * 10**there), key=lambda load: abs(np.log(load / first)))
-    if (near - first) * (far - first) <= 0:
-        return
+    near, far = (first * 10**power for power in sorted((here, there), key=abs))
+    assume((near - first) * (far - first) > 0)
     nearer, farther = loads_between(first, near), loads_between(first, far)
-    assert nearer[-1] == near
-    assert farther[-1] == far
+    assert (nearer[-1], farther[-1]) == (near, far)
     assert farther[: len(nearer) - 1] == nearer[:-1]
     steps = np.abs(np.diff(np.log([first, *farther])))
     assert steps.max() <= np.log(LOAD_FACTOR) * (1 + 1e-6)
@@ -50,10 +46,9 @@ def test_a_packing_at_the_load_of_settling_is_the_settled_one():
 
 @pytest.mark.slow
 def test_a_seed_is_one_packing_over_loads():
-    at = {"fy": 3.0}
     settled = settle(scene())
     for fy in (3.001, 3.1):
-        carried = settle(scene(fy, settle_at=at))
+        carried = settle(scene(fy, settle_at={"fy": 3.0}))
         assert carried.residual < 1e-9
         assert carried.packing.fy == fy
         # the overlaps of a column of some five disks grow by 2/3 of the share that the load does
@@ -84,8 +79,8 @@ def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
     settled, carried = (settle(scene(fy, settle_friction=True, settle_at={"fy": 3.0})).packing for fy in (3.0, 3.3))
     assert settled.contacts.slip.any()
     assert farthest(carried, settled) < 0.02 * 0.3
-    shared = {(i, j): s for i, j, s in zip(settled.contacts.i, settled.contacts.j, settled.contacts.slip, strict=True)}
-    pairs = zip(carried.contacts.i, carried.contacts.j, carried.contacts.slip, strict=True)
-    both = np.array([(shared[i, j], slip) for i, j, slip in pairs if (i, j) in shared])
+    contacts = [each.contacts for each in (settled, carried)]
+    one, other = ({(i, j): s for i, j, s in zip(c.i, c.j, c.slip, strict=True)} for c in contacts)
+    both = np.array([(one[pair], other[pair]) for pair in one.keys() & other.keys()])
     assert np.corrcoef(both.T)[0, 1] > 0.9
     assert not np.array_equal(*both.T)

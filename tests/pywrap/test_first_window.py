@@ -16,22 +16,18 @@ from faultgouge.pywrap.runs.scene_path import scene_path
 def test_no_pair_is_complex_below_the_first_window():
     """360 disks, whose first pair is complex by 3e-5 of itself: by less than clusters of modes may be in error."""
     packing, step = {"disks": 360, "width": 22.6, "seed": 5}, 2 / 360
-    ramp = {"step": step, "until": 3 * step}
-    scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
+    keys = {"packing": packing, "law": {"kn": 2e5}, "ramp": {"step": step, "until": 3 * step}}
+    scene = Scene.from_mapping({**keys, "load": {"fy": 3.0}})
     start = settle(scene)
     with Engine(start.packing) as engine:
         path = scene_path(engine, start, scene)
         onset = find_onset(path, step * np.arange(4))
-        assert not onset.complete
-        assert onset.doubtful == ()
-        distance = 1e-3 * step
-        below = np.linspace(0, onset.fx_c - distance, 5)
-        imaginary = []
-        for fx in [*below, onset.fx_c + distance]:
-            matrix = System.of(path(float(fx))).stiffness
-            imaginary.append(np.abs(eigvals(matrix.toarray(), check_finite=False).imag).max())
+        assert (onset.complete, onset.doubtful) == (False, ())
+        loads = [*np.linspace(0, onset.fx_c - 1e-3 * step, 5), onset.fx_c + 1e-3 * step]
+        matrices = [System.of(path(float(fx))).stiffness.toarray() for fx in loads]
+    imaginary = [np.abs(eigvals(each, check_finite=False).imag).max() for each in matrices]
     # A double eigenvalue is uncertain by the root of u |A| times its coupling, which is of order 1.
-    noise = 10 * np.sqrt(unit_rounding(matrix.data))
+    noise = 10 * np.sqrt(unit_rounding(matrices[-1]))
     assert max(imaginary[:-1]) < noise < imaginary[-1]
 
 
@@ -63,7 +59,6 @@ def test_a_window_is_found_between_loads_far_apart(keys, apart, window, known):
     scene = Scene.from_mapping({**keys, "load": {"fy": 3.0}})
     with Engine((start := settle(scene)).packing) as engine:
         path = scene_path(engine, start, scene)
-        for fx in ramp_loads(scene)[1:]:
-            path(float(fx))
+        list(path.climb(ramp_loads(scene)[1:]))
         (found,) = find_onset(path, ramp_loads(scene) if apart is None else apart).windows
     assert (found.fx_onset, found.fx_end) == pytest.approx(window, abs=known)

@@ -9,13 +9,8 @@ from reference_layer import toml
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset import load_at_onset
 
-SECTIONS = {
-    "packing": {"seed": 4, "disks": 40, "width": 7.5},
-    "law": {"kn": 2e5},
-    "load": {"fy": 3.0},
-    "ramp": {"step": 1e-2, "until": 0.05},
-    "perturb": {"time": 1.0},
-}
+SECTIONS = {"packing": {"seed": 4, "disks": 40, "width": 7.5}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+SECTIONS |= {"ramp": {"step": 1e-2, "until": 0.05}, "perturb": {"time": 1.0}}
 WEAKENING = {"friction": {"v0": 1e-6, "v_ss": 1e-5, "mu_ss": 0.8}}
 
 

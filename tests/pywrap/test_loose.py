@@ -11,10 +11,8 @@ from faultgouge.pywrap.scenes.random_start import random_start
 
 def smallest_gap(start: Disks) -> float:
     """Distance between the surfaces of the closest pair, or of the closest disk and the floor."""
-    position = start.position
-    if start.box_length is not None:
-        shift = np.array([start.box_length, 0.0])
-        position = np.concatenate([position - shift, position, position + shift])
+    images = [] if start.box_length is None else [(-start.box_length, 0.0), (start.box_length, 0.0)]
+    position = np.concatenate([start.position + shift for shift in [(0.0, 0.0), *images]])
     radius = np.resize(start.radius, len(position))
     i, j = cKDTree(position).query_pairs(2.01 * radius.max(), output_type="ndarray").T
     pairs = np.hypot(*(position[i] - position[j]).T) - radius[i] - radius[j]

@@ -14,13 +14,8 @@ from faultgouge.pywrap.equilibria.rattlers import clear_rattlers, highest_corner
 
 
 def packing(position, radius, box_length=None):
-    return Packing(
-        position=np.array(position, dtype=float),
-        radius=np.broadcast_to(radius, len(position)),
-        contacts=Contacts([], [], []),
-        law=MindlinLaw(2e5, 1e5, 1.0),
-        box_length=box_length,
-    )
+    law, none = MindlinLaw(2e5, 1e5, 1.0), Contacts([], [], [])
+    return Packing(position=position, radius=radius, contacts=none, law=law, box_length=box_length)
 
 
 def narrowest_gap(cage, disk, place):
@@ -48,8 +43,8 @@ def test_a_move_is_that_of_a_solver_of_linear_programs():
     """SciPy's, which knows a solution to 1e-7, on cages of random neighbours."""
     from scipy.optimize import linprog
 
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
         angles = rng.uniform(0, 2 * np.pi, 8)
         sides = np.column_stack([np.cos(angles), np.sin(angles), np.ones(8)])
         sides, bounds = np.vstack([sides, np.eye(3), -np.eye(3)]), np.append(rng.uniform(0.01, 0.4, 8), 6 * [0.3])
@@ -73,13 +68,11 @@ def test_the_narrowest_gap_of_a_lone_mover_is_never_narrower(seed, box_length):
 
 def beside(packing, rank, gap):
     """A rattler, and the packing in which it lies so far from one of its neighbours."""
-    rattler = packing.rattlers[0]
-    others = np.delete(np.arange(len(packing)), rattler)
-    branch = packing.position[others] - packing.position[rattler]
+    rattler, position = packing.rattlers[0], packing.position.copy()
+    branch = position - position[rattler]
     distance = np.hypot(*branch.T)
-    gaps = distance - packing.radius[others] - packing.radius[rattler]
-    near = np.argsort(gaps)[rank]
-    position = packing.position.copy()
+    gaps = distance - packing.radius - packing.radius[rattler]
+    near = np.argsort(gaps)[1 + rank]  # the first is itself
     position[rattler] += (gaps[near] - gap) * branch[near] / distance[near]
     contacts = touching(position, packing.radius, packing.box_length)
     return rattler, replace(packing, position=position, contacts=contacts)
@@ -87,7 +80,7 @@ def beside(packing, rank, gap):
 
 def test_rattlers_are_moved_clear_and_nothing_else_is(reference_packing):
     packing = reference_packing(1.0)
-    rattler, pushed = beside(packing, 0, -1e-9)
+    rattler, pushed = beside(packing, rank=0, gap=-1e-9)
     assert rattler not in pushed.rattlers
     cleared = clear_rattlers(pushed, pushed.loaded(1e-6).rattlers)
     assert rattler in cleared.rattlers

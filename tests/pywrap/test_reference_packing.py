@@ -17,31 +17,19 @@ from faultgouge.pywrap.runs.scene_path import next_equilibrium, scene_path
 FX = 0.01
 
 
-def scene(method, step):
-    ramp = {"step": step, "until": FX, "method": method}
-    if method == "overdamped":
-        ramp["force_tolerance"] = 1e-10
+def scene(step, **method):
+    ramp = {"step": step, "until": FX, **method}
     return Scene.from_mapping({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
-
-
-def ramped(packing, method, increment):
-    start, reached = at_rest(packing), []
-    with Engine(packing) as engine:
-        for k in range(1, round(FX / increment) + 1):
-            start = next_equilibrium(engine, start, k * increment, scene(method, increment))
-            reached.append(start)
-    return reached
 
 
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("increment", [1e-3, 2.5e-4])
-def test_newton_ramp(reference, reference_packing, number, increment):
+def test_newton_ramp(reference, climbed, number, increment):
     case = reference["cases"][number]
-    reached = ramped(reference_packing(case["mu"]), "newton", increment)
+    reached = climbed(FX, increment, case["mu"])
     packing = reached[-1].packing
-    assert len(packing.contacts) == case["contacts"]
-    assert packing.contacts.floor.sum() == case["floor_contacts"]
-    assert len(packing.rattlers) == case["rattlers"]
+    counts = len(packing.contacts), packing.contacts.floor.sum(), len(packing.rattlers)
+    assert counts == (case["contacts"], case["floor_contacts"], case["rattlers"])
     matrix = stiffness_matrix(packing).toarray()
     eigenvalues = spectrum(packing).eigenvalues.real
     assert np.trace(matrix) == pytest.approx(case["trace_K"], rel=1e-9)
@@ -60,17 +48,21 @@ def test_newton_ramp(reference, reference_packing, number, increment):
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_newton_and_overdamped_dynamics_agree(reference_packing):
+def test_newton_and_overdamped_dynamics_agree(reference_packing, climbed):
     """With contacts at the bound: on a monotonic ramp they slide one way, whatever the path in a step."""
-    newton, overdamped = (ramped(reference_packing(0.05), method, 2e-3)[-1] for method in ("newton", "overdamped"))
-    packing = newton.packing
+    packing, relaxed = climbed(FX, 2e-3, 0.05)[-1].packing, at_rest(reference_packing(0.05))
+    settings = scene(2e-3, method="overdamped", force_tolerance=1e-10)
+    with Engine(relaxed.packing) as engine:
+        for k in range(1, 6):
+            relaxed = next_equilibrium(engine, relaxed, k * 2e-3, settings)
+    overdamped = relaxed.packing
     # the limit is taken at the overlap as Python rounds it
     at_bound = np.abs(packing.contacts.slip) > (1 - 1e-9) * packing.law.slip_limit(packing.geometry.overlap)
     assert at_bound.any()
     # Late in a relaxation a step is shorter than the last place of a coordinate: positions stand and slips still creep.
     # Each increment adds about 1e-11 to the difference by that; the tolerance of 1e-10 over the softest mode as much.
-    assert np.abs(packing.position - overdamped.packing.position).max() < 1e-10
-    np.testing.assert_allclose(packing.contacts.slip, overdamped.packing.contacts.slip, rtol=0, atol=2e-10)
+    assert np.abs(packing.position - overdamped.position).max() < 1e-10
+    np.testing.assert_allclose(packing.contacts.slip, overdamped.contacts.slip, rtol=0, atol=2e-10)
 
 
 def test_newton_is_quadratic(reference_packing):
@@ -92,10 +84,9 @@ def test_newton_is_quadratic(reference_packing):
 
 
 def test_packing_that_flows_says_where(reference_packing):
-    packing = reference_packing(0.1)
-    state = at_rest(packing)
+    state = at_rest(reference_packing(0.1))
     says = r"no equilibrium was found beyond F_x = 0\.\d+"
-    with Engine(packing) as engine, pytest.raises(NoEquilibriumError, match=says):  # noqa: PT012, the climb ends in it
+    with Engine(state.packing) as engine, pytest.raises(NoEquilibriumError, match=says):  # noqa: PT012, the climb's end
         for k in range(1, 40):
             state = equilibrate(engine, state, 0.05 * k)
     assert 0.05 < state.fx < 1.0
@@ -107,7 +98,7 @@ def test_onset(reference, reference_packing, number):
     case, increment = reference["cases"][number], 1e-3
     packing = reference_packing(case["mu"])
     with Engine(packing) as engine:
-        path = scene_path(engine, at_rest(packing), scene("newton", increment))
+        path = scene_path(engine, at_rest(packing), scene(increment))
         onset = find_onset(path, increment * np.arange(round(case["onset_fx"] / increment) + 3))
     assert onset.fx_c == pytest.approx(case["onset_fx"], rel=1e-9)
     assert abs(onset.fx_c - case["onset_fx"]) < 3 * onset.error
@@ -116,17 +107,13 @@ def test_onset(reference, reference_packing, number):
 
 def test_rattler_on_which_a_contact_slides_is_not_thrown(reference_packing):
     """Nothing holds it across the contact, along which friction drags it."""
-    bed = reference_packing(1.0)
-    rattler, near = bed.rattlers[0], 0
-    place = bed.position.copy()
+    bed, near = reference_packing(1.0), 0
+    rattler, place, c = bed.rattlers[0], bed.position.copy(), bed.contacts
     overlap = 5e-10  # of a contact that carries little more than the rounding of coordinates
     place[rattler] = place[near] + np.array([0.0, bed.radius[rattler] + bed.radius[near] - overlap])
-    contacts = bed.contacts
-    i, j = sorted((rattler, near))
-    slip = np.append(np.zeros(len(contacts)), bed.law.slip_limit(overlap))
-    packing = replace(bed, position=place, contacts=Contacts(np.append(contacts.i, i), np.append(contacts.j, j), slip))
-    force = np.zeros(3 * len(packing))
-    force[np.flatnonzero(packing.top)] = 1e-3
+    slip = np.append(np.zeros(len(c)), bed.law.slip_limit(overlap))
+    packing = replace(bed, position=place, contacts=Contacts(np.append(c.i, near), np.append(c.j, rattler), slip))
+    force = np.concatenate([1e-3 * packing.top, np.zeros(2 * len(packing))])
     step = factor_stiffness(Trial.of(packing), rounding_floor(packing)).solver.solve(force).reshape(3, -1)
     # what moves the rattler is its neighbour; with K alone it would go as far
     assert np.abs(step[:, rattler]).max() < 0.1 * np.abs(step[:, near]).max()

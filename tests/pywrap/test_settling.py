@@ -23,11 +23,6 @@ def scene(**packing):
     return Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}})
 
 
-@pytest.fixture(scope="module")
-def large():
-    return settle(scene(**LARGE))
-
-
 @pytest.mark.parametrize(
     ("keys", "most"),
     [({"seed": 9}, 2e-10), *(pytest.param(LARGE | {"seed": n}, 3e-10, marks=pytest.mark.slow) for n in (2, 3))],
@@ -41,8 +36,7 @@ def test_settled_packing_is_in_balance_and_ready_for_friction(keys, most):
     # zero slips: no term that is not symmetric, but for the rounding of products
     assert np.abs(matrix - matrix.T).max() < 1e-15 * np.abs(matrix).max()
     # the load rests on the floor, to the residual of each disk
-    floor = packing.contacts.floor
-    assert packing.normal_force[floor].sum() == pytest.approx(3.0 * packing.top.sum(), abs=1e-8)
+    assert packing.normal_force[packing.contacts.floor].sum() == pytest.approx(3.0 * packing.top.sum(), abs=1e-8)
     assert not packing.top[packing.rattlers].any()
     # the layer, a tenth, lies on the bed: of 17 disks in height it fills the upper two
     assert packing.top.sum() == len(packing) / 10
@@ -58,11 +52,10 @@ def test_layer_that_always_sinks_is_refused():
 @pytest.mark.slow
 def test_a_seed_whose_layer_sinks_is_the_packing_of_its_next_loose_start():
     # which seed that is depends on the build, since settling is chaotic; of so thin a layer one start in eight sinks
-    for seed in range(100):
-        told = []
+    told, seed = [], -1
+    while not told and seed < 100:
+        seed += 1
         found = settle(scene(disks=60, top=7, width=12.0, seed=seed), watch=told.append)
-        if told:
-            break
     assert told[0] == "the upper layer sank through the bed: loose start 2 of 5"
     assert found.residual < 1.5 * found.floor
     again = settle(scene(disks=60, top=7, width=12.0, seed=seed)).packing
@@ -86,12 +79,9 @@ def lowest(packing: Packing) -> np.ndarray:
 
 def test_disk_on_top_of_another_rolls_down():
     """Balanced on a tip: a saddle at a hair's breadth, from which it goes down into the hollow."""
-    radius = np.full(3, 0.5)
-    position = np.array([[2.0, 0.4995], [3.4, 0.4995], [2.0 + 1e-3, 1.4990]])
-    law = MindlinLaw(2e5, 0.0, 0.0)
-    top = np.array([False, False, True])
-    contacts = touching(position, radius, 8.0)
-    packing = Packing(position=position, radius=radius, contacts=contacts, law=law, box_length=8.0, top=top, fy=3.0)
+    radius, position = np.full(3, 0.5), np.array([[2.0, 0.4995], [3.4, 0.4995], [2.0 + 1e-3, 1.4990]])
+    bed = {"law": MindlinLaw(2e5, 0.0, 0.0), "contacts": touching(position, radius, 8.0), "box_length": 8.0}
+    packing = Packing(position=position, radius=radius, top=np.arange(3) == 2, fy=3.0, **bed)
     assert lowest(packing)[0] < 0
     assert not minimize_energy(packing, 2)[1]
     packing, found = minimize_energy(packing, 400)
@@ -104,15 +94,15 @@ def test_disk_on_top_of_another_rolls_down():
 
 @pytest.mark.ranks
 @pytest.mark.long
-def test_same_packing_on_two_ranks(large, tmp_path):
+def test_same_packing_on_two_ranks(tmp_path):
     """`tests/docs/test_examples.py` has the same of 40 disks, in `make test`."""
-    script = (
-        "import sys, numpy as np\n"
-        "from mpi4py import MPI\n"
-        "from faultgouge.pywrap import Scene, settle\n"
-        f"packing = settle(Scene.from_mapping({scene(**LARGE).resolved()!r})).packing\n"
-        "if MPI.COMM_WORLD.rank == 0: np.save(sys.argv[1], packing.position)\n"
-    )
+    script = f"""
+import sys, numpy as np
+from mpi4py import MPI
+from faultgouge.pywrap import Scene, settle
+packing = settle(Scene.from_mapping({scene(**LARGE).resolved()!r})).packing
+if MPI.COMM_WORLD.rank == 0: np.save(sys.argv[1], packing.position)
+"""
     command = [*on_ranks(2), sys.executable, "-c", script, tmp_path / "two.npy"]
     subprocess.run(command, check=True, timeout=300)
-    assert np.array_equal(np.load(tmp_path / "two.npy"), large.packing.position)
+    assert np.array_equal(np.load(tmp_path / "two.npy"), settle(scene(**LARGE)).packing.position)

@@ -18,12 +18,20 @@ from faultgouge.pywrap.scenes.sections import Ramp
 SCENE = {"packing": {"disks": 12, "width": 4.1, "seed": 3}, "law": {"kn": 2e5, "mu": 0.3}, "load": {"fy": 3.0}}
 
 
-def cycle(until):
-    return toml(SCENE | {"ramp": {"step": 0.1, "until": until}})
+@pytest.fixture
+def cycle(faultgouge_here, tmp_path):
+    """Runs a ramp along a way, and gives what it says."""
+
+    def run(until, *words):
+        (tmp_path / "scene.toml").write_text(toml(SCENE | {"ramp": {"step": 0.1, "until": until}}))
+        return faultgouge_here("ramp", "scene.toml", *words).stdout
+
+    return run
 
 
-def way(step, until):
-    return all_loads(Ramp(step=step, until=until)).tolist()
+def packings_of(path):
+    with RunFile(path) as file:
+        return [file.packing(k) for k in range(len(file))]
 
 
 @pytest.mark.parametrize(
@@ -37,9 +45,9 @@ def way(step, until):
     ],
 )
 def test_the_way_goes_through_multiples_of_the_step(until, wanted):
-    assert way(0.1, until) == pytest.approx([0.1 * each for each in wanted], rel=1e-15)
-    multiples = [each for each, k in zip(way(0.1, until), wanted, strict=True) if k == int(k)]
-    assert multiples == [int(k) * 0.1 for k in wanted if k == int(k)]  # to the bit, on each way
+    loads = all_loads(Ramp(step=0.1, until=until))
+    assert loads == pytest.approx([0.1 * each for each in wanted], rel=1e-15)
+    assert all(load == k * 0.1 for load, k in zip(loads, wanted, strict=True) if k == int(k))  # to the bit, on each way
 
 
 def test_a_run_goes_on_where_it_was_on_the_way():
@@ -53,10 +61,8 @@ def test_a_run_goes_on_where_it_was_on_the_way():
 
 
 def test_an_onset_is_sought_on_the_way_to_the_first_turning_point():
-    there, back = (
-        Scene.from_mapping({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 0.1} | turns})
-        for turns in ({"until": [0.2, -0.1]}, {"until": [-0.2, 0.1]})
-    )
+    ramps = [{"step": 0.1, "until": until} for until in ([0.2, -0.1], [-0.2, 0.1])]
+    there, back = (Scene.from_mapping(SCENE | {"ramp": each}) for each in ramps)
     assert ramp_loads(there).tolist() == [0.0, 0.1, 0.2]
     with pytest.raises(SceneError, match="onsets are sought above 0"):
         ramp_loads(back)
@@ -69,14 +75,12 @@ def test_loads_that_make_no_sense_are_refused(sections, says, refused_scene):
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_here):
-    (tmp_path / "scene.toml").write_text(cycle([0.5, -0.5, 0.5]))
-    (tmp_path / "short.toml").write_text(cycle([0.5, -0.2]))
-    left = json.loads(faultgouge_here("ramp", "scene.toml", "-o", "cycle.h5", "--json").stdout)["hysteresis"]
-    faultgouge_here("ramp", "short.toml", "-o", "parts.h5")
-    assert "F_x is back at 0.5" in faultgouge_here("ramp", "scene.toml", "-o", "parts.h5").stdout
-    packings, parts = packings_of(tmp_path / "cycle.h5"), packings_of(tmp_path / "parts.h5")
-    assert packings == parts
+def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, cycle, faultgouge_here):
+    cycle([0.5, -0.2], "-o", "parts.h5")
+    assert "F_x is back at 0.5" in cycle([0.5, -0.5, 0.5], "-o", "parts.h5")
+    left = json.loads(cycle([0.5, -0.5, 0.5], "-o", "cycle.h5", "--json"))["hysteresis"]
+    packings = packings_of(tmp_path / "cycle.h5")
+    assert packings == packings_of(tmp_path / "parts.h5")
     assert turning_points(np.array([each.fx for each in packings])) == [5, 15]
     found = hysteresis(packings)
     assert left == {"fx": 0.5, "begin": 5, "remaining": found.remaining, "work": found.work, "closes": False}
@@ -99,17 +103,10 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_her
     assert [float(re.search(r" fx=(\S+)", head)[1]) for head in heads] == [each.fx for each in packings]
 
 
-def packings_of(path):
-    with RunFile(path) as file:
-        return [file.packing(k) for k in range(len(file))]
-
-
 @pytest.mark.slow
-def test_a_small_cycle_closes(tmp_path, faultgouge_here):
+def test_a_small_cycle_closes(tmp_path, cycle):
     """No contact slides for good: what remains is 1e-12 of how far the layer has moved, and no work."""
-    (tmp_path / "scene.toml").write_text(cycle([0.1, 0.0]))
-    said = faultgouge_here("ramp", "scene.toml").stdout
-    assert "F_x is back at 0, and so is the upper layer: the path closes, to rounding" in said
+    assert "F_x is back at 0, and so is the upper layer: the path closes, to rounding" in cycle([0.1, 0.0])
     found = hysteresis(packings_of(tmp_path / "run.h5"))
     assert found.closes
     assert abs(found.work) < 1e-9 * 0.1 * 3e-4  # of F_x times the displacement

@@ -24,12 +24,8 @@ def sized(**sections):
     return Scene.from_mapping({**SIZED, **sections})
 
 
-def scene(**units):
-    return Scene.from_mapping({**LEAST, "units": {**QUARTZ, **units}})
-
-
 def test_units_are_those_of_hertz_and_of_the_grains():
-    real = real_units(scene())
+    real = real_units(Scene.from_mapping({**LEAST, "units": QUARTZ}))
     assert (real.length, real.mass) == pytest.approx((1e-4, 2650 * np.pi / 6 * 1e-12), rel=1e-12)
     # two spheres of radius R press with (4/3) E* sqrt(R/2) delta^(3/2), E* = E/2(1 - nu^2)
     stiffness = 4 / 3 * 95e9 / 2 / (1 - 0.08**2) * np.sqrt(0.5e-4 / 2)
@@ -55,39 +51,30 @@ def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_
     assert other == own
 
 
-@pytest.mark.parametrize(
-    ("keys", "says"),
-    rows_of("pywrap/refused_units.txt"),
-)
+@pytest.mark.parametrize(("keys", "says"), rows_of("pywrap/refused_units.txt"))
 def test_units_that_do_not_convert_are_refused_in_one_sentence(refused_scene, keys, says):
     assert says in refused_scene({**LEAST, "units": {**QUARTZ, **keys}})
 
 
-def test_restitution_is_one_without_dashpot_and_falls_with_the_velocity_as_it_should():
+@pytest.mark.parametrize("wanted", [0.99, 0.9, 0.5])
+def test_restitution_falls_with_the_velocity_and_a_dashpot_gives_it(wanted):
     assert restitution(2e5, 0.0, 1.0, 0.1) == pytest.approx(1.0, abs=1e-8)
     # for weak damping 1 - e grows as v^(1/5) (Brilliantov et al. 1996)
     slow, fast = (1 - restitution(2e5, 1.0, 1.0, v) for v in (1e-3, 32e-3))
     assert fast / slow == pytest.approx(2.0, rel=2e-3)
-
-
-@pytest.mark.parametrize("wanted", [0.99, 0.9, 0.5])
-def test_dashpot_of_a_restitution_gives_it(wanted):
     assert restitution(2e5, dashpot(2e5, wanted, 2.0, 0.03), 2.0, 0.03) == pytest.approx(wanted, rel=1e-8)
 
 
 def test_stiffness_and_load_follow_from_the_grains_and_the_overburden():
     found = sized(units={**QUARTZ, "overburden": "10 MPa"})
+    given = {fy: sized(load={"fy": fy}).load.fy for fy in ("10 MPa", "100 bar", "0.119 N", "119 mN")}
+    assert given == dict.fromkeys(given, found.load.fy)  # a force on a disk or a stress on the layer
     assert (found.packing.radii, found.packing.width, found.law.kn) == ((0.5, 0.7), 11.9, 2e5)
     # ten disks on 1.19 mm by 0.1 mm, and k of two spheres, 4/3 E* sqrt(R/2)
     force, stiffness = 10e6 * 1.19e-3 * 1e-4 / 10, 4 / 3 * 95e9 / 2 / (1 - 0.08**2) * np.sqrt(0.25e-4)
     assert found.law.kn / found.load.fy == pytest.approx(stiffness * 1e-6 / force, rel=1e-11)
     assert real_units(found).overburden == pytest.approx(10e6, rel=1e-11)
     assert Scene.from_mapping(found.resolved()) == found
-
-
-@pytest.mark.parametrize("fy", ["10 MPa", "100 bar", "0.119 N", "119 mN"])
-def test_a_load_is_a_force_on_a_disk_or_a_stress_on_the_layer(fy):
-    assert sized(load={"fy": fy}).load.fy == sized(units={**QUARTZ, "overburden": "10 MPa"}).load.fy
 
 
 def test_any_number_of_a_scene_may_have_its_unit():
@@ -109,19 +96,18 @@ def test_any_number_of_a_scene_may_have_its_unit():
     assert [real.stress(each) for each in stresses] == pytest.approx([1e6, 1e6, 0.0, 1e3, 1e6, 2e6])
     assert found.law.kt / found.law.kn == pytest.approx(1e8 / 3.187e8, rel=1e-3)  # as is kn, given to four digits
     moved = (perturb.amplitude * real.force, real.frequency(perturb.omega), perturb.time * real.time)
-    assert moved == pytest.approx((1e-9, 1e3, 1e-3))
+    assert (*moved, real.velocity(found.friction.v0)) == pytest.approx((1e-9, 1e3, 1e-3, 1e-3))
     assert np.array(found.trigger.omega) / real.time == pytest.approx([2e6 * np.pi, 1e6])
-    damped = (found.damping.tau * real.time, found.damping.cn * real.force * real.time / real.length**1.5)
-    assert (real.velocity(found.friction.v0), *damped) == pytest.approx((1e-3, 1.0, 1.0))
-    assert found.relax.damping * real.mass / real.time == pytest.approx(1.0)
+    damped = [found.damping.tau * real.time, found.damping.cn * real.force * real.time / real.length**1.5]
+    assert [*damped, found.relax.damping * real.mass / real.time] == pytest.approx([1.0] * 3)
 
 
 def test_a_drive_and_a_moving_floor_may_have_units():
     protocol = [["1 mm/s", "1 ms"], [0.0, "2 ms"]]
     drive = {"spring": "10 N/m", "protocol": protocol, "signal": "pulse", "at": "1 us", "omega": "1 MHz"}
-    on_floor = {"fx": 0.0, "time": 1.0, "signal": "pulse", "on": "floor", "omega": 1.0, "amplitude": "2 mm/s"}
-    scale = {"scale": "2 mm/s", "on": "floor", "states": "1 us"}
-    found = sized(load={"fy": 3.0}, drive={**drive, **scale}, perturb=on_floor)
+    drive |= {"scale": "2 mm/s", "on": "floor", "states": "1 us"}
+    perturb = {"fx": 0.0, "time": 1.0, "signal": "pulse", "on": "floor", "omega": 1.0, "amplitude": "2 mm/s"}
+    found = sized(load={"fy": 3.0}, drive=drive, perturb=perturb)
     real, (first, second) = real_units(found), found.drive.protocol
     assert found.drive.spring * real.force / real.length == pytest.approx(10)
     times = [real.velocity(first[0]), first[1] * real.time, second[0], second[1] * real.time]
@@ -144,9 +130,6 @@ def test_every_number_of_a_scene_has_its_dimension_or_none():
                 assert "BeforeValidator" in f"{field.metadata}{text}", f"{name}.{key}"
 
 
-@pytest.mark.parametrize(
-    ("sections", "says"),
-    rows_of("pywrap/refused_quantities.txt", QUARTZ=QUARTZ),
-)
+@pytest.mark.parametrize(("sections", "says"), rows_of("pywrap/refused_quantities.txt", QUARTZ=QUARTZ))
 def test_quantities_that_do_not_fit_are_refused_in_one_sentence(refused_scene, sections, says):
     assert says in refused_scene({**SIZED, **sections})

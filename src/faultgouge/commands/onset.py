@@ -65,9 +65,8 @@ def onset(
                 yield f"mu = {mu:g}: without dissipation {undamped.describe()}"
             if len(scene.law.mus) > 1:
                 yield f"mu = {mu:g}: no onset: {error}"
-                failed = OnsetError(
-                    f"None of the {len(scene.law.mus)} friction coefficients has an onset on this ramp."
-                )
+                count = len(scene.law.mus)
+                failed = OnsetError(f"None of the {count} friction coefficients has an onset on this ramp.")
     first = next((each for each in found if each["fx_c"] is not None), None)
     if first is not None or any("undamped" in each for each in found):
         yield f'law of friction: {scene.law.in_words} (history = "{scene.law.history}")'

@@ -224,9 +224,8 @@ def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -
     yield f"{configuration!r}".removeprefix("<Configuration: ").removesuffix(">")
     yield f"largest stable time step {step:.6g}{error}; all steps up to {step.certain:.6g} are stable for certain"
     for name, value in rules.items():
-        share = (
-            "does not apply to these contacts" if value is None else f"{value:.6g}, {value / step:.3g} of the largest"
-        )
+        share = "does not apply to these contacts"
+        share = share if value is None else f"{value:.6g}, {value / step:.3g} of the largest"
         yield f"  {RULES[name]}: {share}"
     # infinite where nothing touches: JSON has no such number
     yield plain({"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules})

@@ -248,11 +248,8 @@ def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
                         say(f"warning: {warning}")
                 record.append(Equilibrium.of(start))
             assert record.last is not None
-            slips, start, what = (
-                record.slips,
-                record.last.packing,
-                "driving" if path == output else f"driving {path.name}",
-            )
+            slips, start = record.slips, record.last.packing
+            what = "driving" if path == output else f"driving {path.name}"
             with status(what) as show:
                 for step in record.drive(others if path == output else None):
                     slips += step.slip is not None
@@ -297,9 +294,8 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
         headings = [key.replace("force", "F").replace("_", " ") for key in SLIP_COLUMNS]
         yield table_of(headings, [[f"{row[key]:.4g}" for key in SLIP_COLUMNS] for row in rows])
         apart = (slips[-1].begins - slips[0].begins) / max(1, len(slips) - 1)
-        many = f"{counted(len(slips), 'slip')} up to {time}" + (
-            f", one in {apart:.4g} units of time" if slips[1:] else ""
-        )
+        each = f", one in {apart:.4g} units of time" if slips[1:] else ""
+        many = f"{counted(len(slips), 'slip')} up to {time}{each}"
         around = f"{friction.before:.3g} before slips, {friction.after:.3g} after them"
         yield f"{many}; {mean} from the first slip on, {around}{unended}"
     else:

@@ -51,14 +51,11 @@ def test_weak_dashpots_leave_a_limit_that_holds(wearing, monkeypatch):
 
 def test_what_is_not_known_to_decay_has_no_limit(wearing):
     found = follow_creep(OneSidedSystem.of(wearing(0.5, 600.0)), 1)
-    assert found.limit is None
-    assert not found.settled
+    assert (found.limit, found.settled) == (None, False)
 
 
 def test_forces_that_fall_far_more_than_they_rise_make_vibration_grow(wearing):
     """The steps of closing and parting push the packing, at more than the mean of both loses."""
     told = stability(wearing(2.0, 20.0))
-    assert told.sticking.stable
-    assert told.creep.grows
-    assert told.stable is False
+    assert (told.sticking.stable, told.creep.grows, told.stable) == (True, True, False)
     assert told.growth_rate == told.creep.growth_rate > 0

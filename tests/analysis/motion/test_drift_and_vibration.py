@@ -22,9 +22,7 @@ def test_what_follows_a_load_that_rises_does_not_vibrate(exponent):
     at_rest = stuck_at_rest(cn=2.0, ct=1.0, exponent=exponent)
     assert np.any(at_rest.contacts.closing != at_rest.contacts.parting) == (exponent == 1.5)
     rising = stability(at_rest, rise=RISE).rising
-    assert rising.steady
-    assert rising.vibration == 0
-    assert rising.time is None
+    assert (rising.steady, rising.vibration, rising.time) == (True, 0, None)
     system = OneSidedSystem.of(at_rest)
     followed = motion_under_load(system, forces_on_coordinates(at_rest, RISE), 30.0, decays=False)
     assert rising.drift == pytest.approx(followed.drift, rel=1e-3)
@@ -36,9 +34,9 @@ def test_what_follows_a_load_that_rises_does_not_vibrate(exponent):
 @pytest.mark.parametrize(("mu", "up", "event"), [(0.5, 0.0, "reaches Coulomb's bound"), (0.0, 1.0, "opens")])
 def test_the_load_may_rise_until_a_contact_reaches_the_bound_or_opens(mu, up, event):
     """At the increase that is told the law itself, displaced by K^-1 times the rise, is about at the bound, or open."""
-    bare, slips = three_disks(), [0.3, -0.3, 0.2, 0.9, 0.1]
+    bare, share = three_disks(), np.array([0.3, -0.3, 0.2, 0.9, 0.1])
     law = replace(bare.law, exponent=1.0, mu=mu)
-    slips = np.array(slips) * law.slip_limit(bare.geometry.overlap) if mu else np.zeros(5)
+    slips = share * law.slip_limit(bare.geometry.overlap)
     packing = replace(bare, contacts=bare.contacts.slipped(slips, None), law=law)
     at_rest = balanced(packing)
     rise = np.array([[1 - up, 0.0], [1 - up, 0.0], [1 - up, up]])

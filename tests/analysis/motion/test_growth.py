@@ -17,14 +17,6 @@ from faultgouge.analysis import (
 )
 
 
-def motion(eigenvalue, vector, time):
-    """D of q = Re(v exp(i omega t)), the growing member of a complex pair."""
-    omega = np.sqrt(complex(eigenvalue))
-    omega = omega if omega.imag < 0 else np.conj(omega)
-    q = (np.exp(1j * omega * time)[:, None] * vector).real
-    return np.mean(q**2, axis=1)
-
-
 @pytest.mark.parametrize("eigenvalue", [2058.0 + 1.8j, 2058.0 + 0.3j, 40.0 + 0.5j])
 @pytest.mark.parametrize("shape", ["standing", "turning", "mixed"])
 def test_rate_of_a_complex_pair(eigenvalue, shape):
@@ -33,7 +25,8 @@ def test_rate_of_a_complex_pair(eigenvalue, shape):
     vector = {"standing": one + 0j, "turning": np.array([1, 1j] * 15), "mixed": one + 0.1j * other}[shape]
     rate = growth_rate(eigenvalue)
     time = np.linspace(0, 34 / rate, 20001)
-    growth = fit_growth(time, 1e-22 * motion(eigenvalue, vector, time), lower=1e-21, upper=1e-10)
+    motion = np.exp(1j * np.conj(np.sqrt(eigenvalue)) * time)[:, None] * vector  # the member that grows
+    growth = fit_growth(time, 1e-22 * np.mean(motion.real**2, axis=1), lower=1e-21, upper=1e-10)
     assert growth.decades > 9
     # 600 samples of incoherent phase make a mean good to 3e-2, and 24 means a slope over 25 e-foldings
     # to 1e-3; three times that for phases that are not all incoherent.
@@ -70,17 +63,15 @@ def run_of(rate, length, share=1e-4, noise=1e-26):
 
 def test_growth_of_a_run_stands_beside_its_prediction(path):
     packing = path(0.022)
-    rate = spectrum(packing).growth_rate()
-    found = growth_of_run(packing, *run_of(rate, 40 / rate))
-    assert found.predicted == rate
-    assert (found.pairs, found.negative, found.enough) == (len(spectrum(packing).pairs), 0, True)
+    known = spectrum(packing)
+    rate = known.growth_rate()
+    full, cut, short = (growth_of_run(packing, *run_of(rate, folds / rate)) for folds in (40, 21, 6))
+    assert (full.predicted, full.pairs, full.negative, full.enough) == (rate, len(known.pairs), 0, True)
     # the noise adds a thousandth at the lower bound
-    assert found.measured.rate == pytest.approx(rate, rel=1e-3)
-    assert found.as_dict()["growth"].keys() >= {"measured", "error", "predicted", "from", "to"}
+    assert full.measured.rate == pytest.approx(rate, rel=1e-3)
+    assert full.as_dict()["growth"].keys() >= {"measured", "error", "predicted", "from", "to"}
     # a run that ends while D still grows is followed to its end
-    found = growth_of_run(packing, *run_of(rate, 21 / rate))
-    assert found.measured.end == pytest.approx(21 / rate, rel=1e-2)
-    short = growth_of_run(packing, *run_of(rate, 6 / rate))
+    assert cut.measured.end == pytest.approx(21 / rate, rel=1e-2)
     assert (short.measured, short.enough) == (None, False)
     # a tenth of the share of one of 300 modes, three decades above the noise, and one more
     assert short.needed * rate == pytest.approx(np.log(1e4 * 3000), rel=1e-12)

@@ -1,5 +1,9 @@
 """The verdict on linear motion: certificate, slow motions and random states beside LAPACK's eigenvalues."""
 
+import re
+from contextlib import suppress
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_spectra import complex_block
@@ -9,9 +13,8 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
-from faultgouge.analysis import Configuration, LinearisedContacts, Motion, fastest_growing
+from faultgouge.analysis import Configuration, Contacts, LinearisedContacts, Motion, fastest_growing
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.motion import linear as module
 from faultgouge.analysis.motion.certificate import NoProofError, prove
 from faultgouge.analysis.motion.eigenvalues import exponential
@@ -27,20 +30,18 @@ def random_packing(seed):
     Some have drag, no tangential dashpots, springs that push apart, or lever arms that differ; some nothing that holds
     them, so that they drift."""
     rng = np.random.default_rng(seed)
-    side = int(rng.integers(4, 8))
+    side = int(rng.integers(4, 7))
     place = np.stack(np.meshgrid(*[np.arange(side)] * 2), -1).reshape(-1, 2) + rng.uniform(-0.25, 0.25, (side**2, 2))
     pairs = cKDTree(place).query_pairs(1.35, output_type="ndarray")
     i, j = pairs[rng.random(len(pairs)) < 0.9].T
     normal = place[i] - place[j]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     count, contacts = len(place), np.arange(len(i))
-    along = np.zeros((2, len(i), 3 * count))  # rows: what a motion stretches and slides
+    stretch, slide = np.zeros((2, len(i), 3 * count))  # rows: what a motion stretches and slides
     for sign, end in ((1, i), (-1, j)):
-        for axis in range(2):
-            along[0, contacts, 3 * end + axis] = sign * normal[:, axis]
-            along[1, contacts, 3 * end + axis] = sign * (-1) ** (axis + 1) * normal[:, 1 - axis]
-        along[1, contacts, 3 * end + 2] = -1.0
-    stretch, slide = along
+        stretch[contacts, 3 * end], stretch[contacts, 3 * end + 1] = sign * normal.T
+        slide[contacts, 3 * end], slide[contacts, 3 * end + 1] = -sign * normal[:, 1], sign * normal[:, 0]
+        slide[contacts, 3 * end + 2] = -1.0
     other = slide.copy()
     other[:, 2::3] *= 1 - rng.choice([0.0, 1e-3])
     kn, kt = rng.uniform(500, 2000, len(i)), rng.uniform(300, 800, len(i))
@@ -49,8 +50,7 @@ def random_packing(seed):
     turn = slide * np.tile([1, 1, 0], count)
     a = stretch.T @ (kn[:, None] * stretch) + other.T @ (kt[:, None] * slide)
     a += other.T @ (follows[:, None] * stretch) - turn.T @ (pressed[:, None] * turn)
-    strength = 10 ** rng.uniform(-4.5, -0.5)
-    tangential = rng.choice([0.5, 0.5, 0.0])
+    strength, tangential = 10 ** rng.uniform(-4.5, -0.5), rng.choice([0.5, 0.5, 0.0])
     g = strength * (stretch.T @ (kn[:, None] * stretch) + tangential * other.T @ (kn[:, None] * slide))
     if rng.random() < 0.3:
         g += 10 ** rng.uniform(-3, 0) * np.eye(3 * count)
@@ -68,25 +68,19 @@ def all_values(a, g):
 def test_certificate_against_lapack_on_random_packings(first):
     """Never a false word: what is proved to decay decays, each stated error covers, and no growth is overlooked."""
     proofs = 0
-    for seed in range(first, first + 20):
-        a, g = random_packing(seed)
-        try:
+    for a, g in map(random_packing, range(first, first + 20)):
+        with suppress(NoProofError):
             found = prove(a, g, 1e-9)
-        except NoProofError:
-            continue
-        proofs += 1
-        s, top = all_values(a, g), np.sqrt(abs(a).sum(axis=1).max())
-        slowest = 2 * s[np.abs(s) > 1e-5 * top].real.max()
-        rounding = 1e-11 * top  # of LAPACK's eigenvalues, whose vectors are oblique
-        assert found.stable is not (slowest > rounding)
-        if found.stable is False and found.at_least:
-            assert found.growth_rate <= slowest + found.error + rounding
-        else:
-            assert abs(found.growth_rate - slowest) <= found.error + rounding
-        if found.s:
-            assert np.abs(s - found.s).min() <= max(found.error, 1e-6 * top)
-        if found.stable:
-            assert found.free == len(a.toarray()) - np.linalg.matrix_rank(a.toarray(), tol=1e-8 * top**2)
+            proofs += 1
+            s, top = all_values(a, g), np.sqrt(abs(a).sum(axis=1).max())
+            slowest = 2 * s[np.abs(s) > 1e-5 * top].real.max()
+            rounding = 1e-11 * top  # of LAPACK's eigenvalues, whose vectors are oblique
+            assert found.stable is not (slowest > rounding)
+            least = -np.inf if found.at_least and found.stable is False else slowest - found.error - rounding
+            assert least <= found.growth_rate <= slowest + found.error + rounding
+            assert not found.s or np.abs(s - found.s).min() <= max(found.error, 1e-6 * top)
+            free = a.shape[0] - np.linalg.matrix_rank(a.toarray(), tol=1e-8 * top**2)
+            assert not found.stable or found.free == free
     assert proofs >= 5
 
 
@@ -107,15 +101,11 @@ def beyond_lapack(monkeypatch):
 
 def row_of_spheres(count, pressed=2.0, dashpot=40.0):
     """Equal spheres side by side on a plane, between two walls that press them together; apart if `pressed` is 0."""
-    first = np.arange(count)
+    first, x, z = np.arange(count), [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
     i, j = np.r_[first[1:], first, 0, count - 1], np.r_[first[:-1], np.full(count + 2, -1)]
-    normal = np.zeros((len(i), 3))
-    normal[: count - 1, 0] = 1.0
-    normal[count - 1 : -2, 2] = 1.0
-    normal[-2:, 0] = 1.0, -1.0
+    normal = np.array([x] * (count - 1) + [z] * count + [x, [-1.0, 0.0, 0.0]])
     force, none, ones = np.where(normal[:, 0] == 0, 1.0, pressed), np.zeros((len(i), 3)), np.ones(len(i))
-    load = np.zeros((count, 2, 3))
-    load[:, 0, 2] = -1.0
+    load = np.tile([[0.0, 0.0, -1.0], [0.0] * 3], (count, 1, 1))
     contacts = LinearisedContacts(
         i=i, j=j, normal=normal, distance=np.where(j >= 0, 1.0, np.inf), overlap=1e-3 * ones,
         slip_arm=np.full((len(i), 2), 0.5), lever_arm=np.full((len(i), 2), 0.5), lever_slope=0 * ones,
@@ -138,20 +128,6 @@ def turned_row(row):
     return derive_frozen(row, contacts=contacts, load=row.load @ q)
 
 
-def with_more(row, contacts, place, load):
-    """A packing with more contacts, each the first one but for what is given, and more particles, each the first."""
-    c, count = row.contacts, len(contacts["i"])
-    joined = {
-        name: np.concatenate([getattr(c, name), contacts.get(name, np.repeat(getattr(c, name)[:1], count, axis=0))])
-        for name in PER_CONTACT
-    }
-    each = {name: np.pad(getattr(row, name), (0, len(place)), "edge") for name in ("radius", "mass", "inertia")}
-    return Configuration(
-        dimension=row.dimension, position=np.vstack([row.position, place]), contacts=LinearisedContacts(**joined),
-        box=row.box, origin=row.origin, periodic=row.periodic, load=np.concatenate([row.load, load]), **each,
-    )  # fmt: skip
-
-
 STRONG, WEAK, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
 
 
@@ -170,13 +146,15 @@ def test_rate_of_a_packing_beyond_lapack_is_that_of_lapack(reference_packing, re
 
 def test_many_particles_alone_with_the_same_eigenvalues_hide_none(reference_packing, beyond_lapack):
     """Two hundred disks on a wall, none of which touches another: more equal eigenvalues than six vectors see."""
-    packing, count = dissipative(reference_packing(1.0), *WEAK).configuration, 200
-    alone = {"i": len(packing) + np.arange(count), "j": np.full(count, -1), "distance": np.full(count, np.inf)}
-    alone |= {"normal": np.tile([0.0, 1.0, 0.0], (count, 1)), "tangential_force": np.zeros((count, 3))}
-    load = np.zeros((count, 2, 3))
-    load[:, 0, 1] = -packing.contacts.normal_force[0]
-    both = packing, with_more(packing, alone, packing.position[:1].repeat(count, 0), load)
-    expected, found = (linear_verdict(Motion.of(each)) for each in both)
+    packing, count, n = reference_packing(1.0), 200, 100
+    place = np.tile([0.0, 0.5 - (packing.fy / packing.law.kn) ** (2 / 3)], (count, 1))
+    c, alone = packing.contacts, n + np.arange(count)
+    both = replace(
+        packing, position=np.vstack([packing.position, place]), radius=np.append(packing.radius, np.full(count, 0.5)),
+        contacts=Contacts(*np.hstack([(c.i, c.j), (alone, 0 * alone - 1)]), np.zeros(len(c) + count)),
+        top=np.append(packing.top, np.ones(count, bool)), mass=None, angle=None,
+    )  # fmt: skip
+    expected, found = (linear_verdict(Motion.of(dissipative(each, *WEAK))) for each in (packing, both))
     assert found.stable is expected.stable is True
     assert found.free == expected.free + count  # these roll
     assert found.growth_rate == pytest.approx(expected.growth_rate, abs=found.error + expected.error)
@@ -209,11 +187,13 @@ def test_motions_that_no_force_opposes_are_counted_and_no_growth(row, stable, fr
 def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
     """Two spheres beside three on a plane push each other apart by 1e-9 of the forces, and turn round each other: this
     motion has an eigenvalue of A below zero, and s next to the root of that."""
-    row, made = row_of_spheres(3, 0.0), []
-    for force in (1e-9, 1e-16):
-        pair = {"i": [4], "j": [3], "normal_force": [force], "friction": [0.5 * force]}
-        pair |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
-        made.append(with_more(row, pair, np.add(row.position[:2], [0.0, 5.0, 0.0]), np.zeros((2, 2, 3))))
+    row = row_of_spheres(5, 1.0)
+    c, load = row.contacts.chosen([3, 4, 5, 6]), row.load.copy()  # that of the last two, and three on the plane
+    load[3:] = 0.0
+    made = [
+        derive_frozen(row, contacts=derive_frozen(c, normal_force=force, friction=0.5 * force), load=load)
+        for force in np.array([[1e-9, 1.0, 1.0, 1.0], [1e-16, 1.0, 1.0, 1.0]])
+    ]
     found, expected = (linear_verdict(Motion.of(each)) for each in made)
     assert made[0].residual == pytest.approx(1e-9)
     assert 1e-6 < np.linalg.eigvals(Motion.of(made[0]).first_order).real.max() < 1e-4
@@ -224,9 +204,8 @@ def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
 
 def test_a_symmetric_stiffness_is_decided_by_its_energy_alone(beyond_lapack):
     found = linear_verdict(Motion.of(row_of_spheres(20, 0.0), dissipation=False))
-    assert found.stable
+    assert (found.stable, found.free) == (True, 40)
     assert found.said == "the stiffness is symmetric, and its energy positive (proved)"
-    assert found.free == 40
 
 
 def test_where_dashpots_do_not_hold_the_law_a_random_state_is_followed(beyond_lapack, path):
@@ -234,19 +213,20 @@ def test_where_dashpots_do_not_hold_the_law_a_random_state_is_followed(beyond_la
     certificate, and a reason within a second."""
     found = linear_verdict(Motion.of(dissipative(path(0.02), 2.0, 0.0, None)), time=5.0)
     assert found.stable is None
-    assert found.reasons[0].startswith("the dashpots hold growth at no frequency below that of the fastest motion")
-    assert "as motion from a random state shows within t = 5.8" in found.reasons[0]
+    assert re.search(
+        "^the dashpots hold growth at no frequency .* a random state shows within t = 5.8", found.reasons[0]
+    )
     assert 0 < found.searched < 20
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_slowest_motions_are_those_of_lapack_and_others_stay_in_a_state(seed):
-    """One alone, and twelve that are nearly one, below all others; oblique, of 700 states in a space of 300."""
+    """One alone, and twelve that are nearly one, below all others; oblique, of 500 states in a space of 300."""
     rng = np.random.default_rng(seed)
-    values = [2.0, *rng.uniform(4.0, 4.04, 12), *rng.uniform(9, 100, 335)]
-    turned, scale = turned_blocks([*values, complex_block(40.0, 0.1)], rng), rng.uniform(0.8, 1.25, 350)
+    values = [2.0, *rng.uniform(4.0, 4.04, 12), *rng.uniform(9, 100, 235)]
+    turned, scale = turned_blocks([*values, complex_block(40.0, 0.1)], rng), rng.uniform(0.8, 1.25, 250)
     a = csr_array(diags_array(scale) @ turned @ diags_array(1 / scale))
-    g, size = csr_array(2e-3 * (a + a.T)), 350
+    g, size = csr_array(2e-3 * (a + a.T)), 250
     s, vectors = np.linalg.eig(np.block([[np.zeros((size, size)), np.eye(size)], [-a.toarray(), -g.toarray()]]))
     known, errors, leave = slow_motions(a, g, csr_array(np.eye(size)), 1.0, 0)
     assert 26 <= len(known) < 100
@@ -289,8 +269,7 @@ def test_common_motion_and_motion_that_nothing_opposes_are_left_out_together():
     a, g = (csr_array(others @ matrix @ others.T) for matrix in (motion.stiffness.toarray(), motion.damping.toarray()))
     widened = Motion(motion.configuration, np.arange(size), np.ones(size), a, g)
     found = follow_decay(widened, csr_array(null_space(y.T)), "", work=3e10)
-    assert found.stable
-    assert found.free == 2
+    assert (found.stable, found.free) == (True, 2)
     assert found.growth_rate == pytest.approx(expected, rel=0.1)
 
 
@@ -307,9 +286,8 @@ def test_fastest_growing_motion(seed, damped):
     growing = [complex_block(30.0, 3.0), complex_block(70.0, 2.5), complex_block(2.0, 0.05)]
     matrix = operator(seed, growing)
     loss = 4e-4 * (matrix + matrix.T) + diags_array(np.random.default_rng(seed).uniform(0, 0.06, matrix.shape[0]))
-    loss = csr_array(loss * damped)
-    values = all_values(matrix, loss)
-    found = fastest_growing(matrix, loss if damped else None)
+    values = all_values(matrix, loss * damped)
+    found = fastest_growing(matrix, csr_array(loss) if damped else None)
     assert found.stable is False
     assert found.growth_rate == pytest.approx(2 * values.real.max(), rel=1e-6)
     assert np.abs(found.s - values).min() < 1e-6
@@ -330,9 +308,8 @@ def test_nothing_grows(damped):
     matrix = operator(5, [complex_block(50.0, 1e-4)])
     damping = csr_array(0.01 * diags_array(np.ones(matrix.shape[0]))) if damped else None
     found = fastest_growing(matrix, damping, periods=(10.0, 30.0))
-    longest = 30 * 2 * np.pi / 10
     assert found.stable is None
-    assert 1 / longest < found.searched < 4 / longest
+    assert 1 < found.searched * 30 * 2 * np.pi / 10 < 4
 
 
 def test_many_that_grow_alike_are_seen_to_grow():

@@ -102,10 +102,9 @@ def test_without_contacts_at_the_bound_it_is_linear(bound):
     times = [0.05, 0.2]
     start = np.concatenate([np.zeros(18), *velocity.T, np.zeros(6)])
     found = one_sided_motion(packing, velocity, times=times)
-    for k, time in enumerate(times):
+    for each, time in zip(found.displacement, times, strict=True):
         linear = (expm(time * motion_matrix(packing)) @ start)[:12].reshape(2, 6).T
-        size = np.abs(linear).max()
-        np.testing.assert_allclose(found.displacement[k], linear, rtol=0, atol=1e-12 * size)
+        np.testing.assert_allclose(each, linear, rtol=0, atol=1e-12 * np.abs(linear).max())
     errors, undamped = [], replace(packing, law=replace(packing.law, cn=0.0, ct=0.0))
     system, exact = OneSidedSystem.of(undamped), one_sided_motion(undamped, velocity, times=[0.2])
     for share in (0.1, 0.05):
@@ -129,27 +128,22 @@ def test_a_body_moves_as_one(bound):
 
     No disk touches another, so that one law is enough.
     """
-    configuration, n = bound.configuration, len(bound)
-    size, k, rate = configuration.coordinates, 3.0, 0.5
-    lead = np.zeros((size, size))
-    lead[0, 0] = lead[1, 0] = 1.0  # x of the first two disks
-    held = np.zeros((size, size))
-    held[0, 0] = k
+    configuration, k, rate, times = bound.configuration, 3.0, 0.5, np.array([0.7, 3.0])
+    none = np.zeros((configuration.coordinates, configuration.coordinates))
+    lead, held = none.copy(), none.copy()
+    lead[:2, 0], held[0, 0] = 1.0, k  # x of the first two disks
     body = derive_frozen(
-        configuration, contacts=configuration.contacts.chosen(np.zeros(len(configuration.contacts), bool)),
-        stiffness=csr_array(held), damping=csr_array((size, size)), constraint=csr_array(lead),
+        configuration, contacts=configuration.contacts.chosen(np.zeros(len(bound.contacts), bool)),
+        stiffness=csr_array(held), damping=csr_array(none), constraint=csr_array(lead),
     )  # fmt: skip
-    rise = np.zeros((n, 2))
-    rise[:2, 0] = rate / 2
-    times = np.array([0.7, 3.0])
+    rise = np.outer(np.arange(len(bound)) < 2, [rate / 2, 0.0])
     found = one_sided_motion(body, rise=rise, times=times)
     omega = np.sqrt(k / configuration.mass[:2].sum())
     wanted = rate / k * (times - np.sin(omega * times) / omega)
-    for disk in (0, 1):
-        np.testing.assert_allclose(found.displacement[:, disk, 0], wanted, rtol=1e-6)
+    np.testing.assert_allclose(found.displacement[:, :2, 0], np.column_stack([wanted, wanted]), rtol=1e-6)
     assert not found.displacement[:, 2:].any()
     moving = stability(body, rise=rise).rising
-    assert moving.drift == pytest.approx(rate / k * np.sqrt(2 / (2 * n)), rel=1e-6)
+    assert moving.drift == pytest.approx(rate / k * np.sqrt(2 / (2 * len(bound))), rel=1e-6)
     assert moving.other_start is None
 
 
@@ -158,10 +152,9 @@ def test_a_disk_that_touches_nothing_flies_on(bound, drag_time):
     """With the drag v = v_0 exp(-t/tau); under a load that rises without drag x = v_0 t + g t^3 / 6 m."""
     n, times = len(bound), np.array([0.5, 1.0, 3.0])
     more = {"radius": 0.5, "angle": 0.0, "top": False, "mass": 4.0}
-    with_rattler = replace(
-        bound, position=np.vstack([bound.position, bound.position.max(axis=0) + 20.0]), drag_time=drag_time,
-        **{name: np.append(getattr(bound, name), value) for name, value in more.items()},
-    )  # fmt: skip
+    more = {name: np.append(getattr(bound, name), value) for name, value in more.items()}
+    place = np.vstack([bound.position, bound.position.max(axis=0) + 20.0])
+    with_rattler = replace(bound, position=place, drag_time=drag_time, **more)
     assert list(with_rattler.rattlers) == [n]
     velocity, rise = np.ones((n + 1, 2)), np.full((n + 1, 2), 3.0)
     found = one_sided_motion(with_rattler, velocity, times=times)

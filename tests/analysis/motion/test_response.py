@@ -39,12 +39,9 @@ def by_digits(matrix, force, start, time, tau):
     n = len(matrix)
     with mpmath.workdps(50):
         system = mpmath.zeros(2 * n + 2)
-        for i in range(n):
-            system[i, n + i] = 1
-            system[n + i, 2 * n] = mpmath.mpf(force[i])
-            system[n + i, n + i] = 0 if tau is None else -1 / mpmath.mpf(tau)
-            for j in range(n):
-                system[n + i, j] = -mpmath.mpf(matrix[i, j])
+        system[:n, n : 2 * n] = mpmath.eye(n)
+        system[n : 2 * n, :n], system[n : 2 * n, 2 * n] = mpmath.matrix(-matrix), mpmath.matrix(force)
+        system[n : 2 * n, n : 2 * n] = mpmath.eye(n) * (0 if tau is None else -1 / mpmath.mpf(tau))
         system[2 * n, 2 * n + 1], system[2 * n + 1, 2 * n] = -mpmath.mpf(OMEGA), mpmath.mpf(OMEGA)
         state = mpmath.matrix([*start, *np.zeros(n), 1, 0])
         end = np.array([float(v) for v in mpmath.expm(system * time) * state])
@@ -61,26 +58,28 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
     return found.displacement[:, :size], found.velocity[:, :size]
 
 
+def assert_exact(matrix, times, tau, digits):
+    """Displacement and velocity are those of fifty digits."""
+    force, start = vectors(len(matrix))
+    found = motion_of(matrix, force, start, times, tau)
+    for k, time in enumerate(times):
+        for part, expected in zip(found, by_digits(matrix, force, start, time, tau), strict=True):
+            np.testing.assert_allclose(part[k], expected, atol=digits * np.abs(expected).max(), rtol=0)
+
+
 @pytest.mark.parametrize("tau", [None, 30.0, 0.05])
 @pytest.mark.parametrize("epsilon", DISTANCES)
 def test_nothing_is_lost_near_a_coalescence(epsilon, tau):
     """Nor far from one, nor where tau = 0.05 damps even the fastest mode beyond oscillation."""
-    matrix, (force, start), time = oblique(epsilon), vectors(5), [0.3, 40.0]
-    found = motion_of(matrix, force, start, time, tau)
-    for k, t in enumerate(time):
-        for part, expected in zip(found, by_digits(matrix, force, start, t, tau), strict=True):
-            # An error u |A| of A itself has an effect of u |A| t^2 delta at a coalescence: 1e-13 at t = 40.
-            np.testing.assert_allclose(part[k], expected, atol=5e-13 * np.abs(expected).max(), rtol=0)
+    # An error u |A| of A itself has an effect of u |A| t^2 delta at a coalescence: 1e-13 at t = 40.
+    assert_exact(oblique(epsilon), [0.3, 40.0], tau, 5e-13)
 
 
 def test_two_pairs_and_a_pair_among_other_modes():
     """Two coalescences, one of them with a third eigenvalue between its members."""
     inner = block_diag([[0.8, 0.2], [-0.2, 1.2]], [[2.0, 200.0], [0.0, 4.0]], 3.0, 5.0)  # the second overlaps by 2/200
-    matrix, (force, start) = turned(inner), vectors(6)
-    found = motion_of(matrix, force, start, [20.0])
-    for part, expected in zip(found, by_digits(matrix, force, start, 20.0, None), strict=True):
-        # |A| = 250 rounds to 3e-14, and t^2/2 |A| u is what a coalescence makes of it
-        np.testing.assert_allclose(part[0], expected, atol=1e-11 * np.abs(expected).max(), rtol=0)
+    # |A| = 250 rounds to 3e-14, and t^2/2 |A| u is what a coalescence makes of it
+    assert_exact(turned(inner), [20.0], None, 1e-11)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.4])
@@ -95,12 +94,11 @@ def test_time_step_is_that_of_velocity_verlet(epsilon, dt):
         x = x + dt * v
         v = v + 0.5 * dt * (force * np.cos(OMEGA * (n + 1) * dt) - matrix @ x)
         run.append((x, v))
-    known = np.array(run)
-    time = dt * np.arange(steps + 1)
+    known, time = np.array(run), dt * np.arange(steps + 1)
     displacement, velocity = motion_of(matrix, force, start, time, dt=dt)
     # Rounding of 400 steps adds up as u steps^2, and the sums of velocities are divided by dt.
-    np.testing.assert_allclose(displacement, known[:, 0], atol=1e-11 * np.abs(known[:, 0]).max())
-    np.testing.assert_allclose(velocity, known[:, 1], atol=1e-11 * np.abs(known[:, 1]).max())
+    for found, expected in ((displacement, known[:, 0]), (velocity, known[:, 1])):
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
     exact, _ = motion_of(matrix, force, start, time)
     assert np.abs(exact - known[:, 0]).max() > 1e-5
 
@@ -120,8 +118,8 @@ def test_motion_of_a_packing_against_the_exponential(cluster, dissipation):
     time, begin = np.linspace(0, 0.1, 6), np.concatenate([start, np.zeros(18), [1, 0]])
     known = np.array([expm(system * t) @ begin for t in time])
     found = linear_response(packing, time, force=force, omega=omega, initial=start)
-    np.testing.assert_allclose(found.displacement, known[:, :18], atol=1e-11 * np.abs(known[:, :18]).max())
-    np.testing.assert_allclose(found.velocity, known[:, 18:36], atol=1e-11 * np.abs(known[:, 18:36]).max())
+    for part, expected in ((found.displacement, known[:, :18]), (found.velocity, known[:, 18:36])):
+        np.testing.assert_allclose(part, expected, atol=1e-11 * np.abs(expected).max())
     moved = packing.position + np.stack([known[:, :6], known[:, 6:12]], axis=-1)
     expected = mean_square_displacement(moved, packing.position, packing.box_length)
     np.testing.assert_allclose(found.msd, expected, rtol=1e-6)

@@ -42,12 +42,11 @@ def test_detector_finds_the_same_while_the_run_goes_on():
     """And says when: two quiet periods after the last fast row; it looks at what was, alone."""
     rows = list(zip(*series(), strict=True))
     detector, found = SlipDetector(VELOCITY, PERIOD), []
-    for k, row in enumerate(rows):
-        slip = detector.add(*row)
-        if slip is not None:
+    for k, row in enumerate(rows, 1):
+        if (slip := detector.add(*row)) is not None:
             assert row[0] - slip.ends == pytest.approx(2 * PERIOD, abs=1.5 * EVERY)
             found.append(slip)
-            assert find_slips(*zip(*rows[: k + 1], strict=True), VELOCITY, PERIOD)[0] == found
+            assert find_slips(*zip(*rows[:k], strict=True), VELOCITY, PERIOD)[0] == found
             assert detector.so_far is None
     assert len(found) == len(SLIPS)
 
@@ -67,9 +66,7 @@ def test_friction_and_a_layer_that_follows_the_spring_without_slips():
     assert find_slips(time, np.full_like(time, 0.5), VELOCITY * time, 0 * time, VELOCITY, PERIOD) == ([], None)
     time, force, moved, energy = series()
     slips, _ = find_slips(time, force, moved, energy, VELOCITY, PERIOD)
-    friction = friction_of(time, force, slips, fy=3.0)
-    assert friction.largest == pytest.approx(force.max() / 3.0)
-    assert friction.before == pytest.approx(np.mean([slip.force_before for slip in slips]) / 3.0)
-    late = time >= 100.0
-    assert friction.mean == pytest.approx(force[late].mean() / 3.0, rel=1e-3)
+    friction, before = friction_of(time, force, slips, fy=3.0), np.mean([slip.force_before for slip in slips])
+    assert (friction.largest, friction.before) == pytest.approx((force.max() / 3.0, before / 3.0))
+    assert friction.mean == pytest.approx(force[time >= 100.0].mean() / 3.0, rel=1e-3)
     assert friction_of(time, force, [], fy=3.0).before is None

@@ -19,23 +19,16 @@ RISE = np.tile([1.0, 0.0], (3, 1))
 
 
 def test_stability_of_three_disks():
-    found = stability(three_disks())
-    assert found.at_bound == 1
-    assert found.stable is None  # in no balance
-    assert "the packing moves" in found.reasons[0]
+    moves = stability(three_disks())  # in no balance
+    assert (moves.at_bound, moves.stable) == (1, None)
+    assert "the packing moves" in moves.reasons[0]
     at_rest = balanced(three_disks())
     told = stability(at_rest)
-    assert told.stable is True
-    assert told.one_sided.grows is False
+    assert (told.stable, told.one_sided.grows) == (True, False)
     assert told.one_sided.amplification > 0
     assert str(told).startswith("stable: each of 4 pushes comes to rest")
     assert "neither of two linear motions decides" in str(told)
     assert json.loads(json.dumps(told.as_dict()))["one_sided"]["pushes"] == told.one_sided["pushes"] == 4
-    assert set(told.as_dict()) >= {
-        "stable", "growth_rate", "undamped", "at_bound", "one_sided", "rising", "asymmetry", "creep", "largest_push",
-        "largest_energy", "push_time", "residual_push", "sticking", "sliding", "free", "searched", "reasons",
-        "not_followed", "remarks", "at_least", "first_change", "follow",
-    }  # fmt: skip
     rising, twice = (stability(at_rest, rise=size * RISE, time=4.0).rising for size in (1, 2))
     assert twice.drift == pytest.approx(2 * rising.drift, rel=1e-9)
     assert dict(rising) == rising.as_dict() | {"other_start": rising.other_start}
@@ -81,7 +74,6 @@ def test_a_packing_that_grows_says_where_its_first_contact_changes():
     told, risen = stability(pile), stability(pile, rise=np.tile([1.0, 0.0], (2, 1)))
     assert told.stable is risen.stable is False
     assert risen.sentences[-1] == "under a load that rises: not followed, since small motion grows"
-    json.dumps(risen.as_dict(), allow_nan=False)
     assert 0 < told.first_change**0.5 < 0.5
     assert f"the first contact changes at a displacement of {told.first_change**0.5:.2g} (root of D)" in str(told)
     ends = replace(told, follow={"displacement": 0.3, "ends": "flows"})
@@ -108,9 +100,8 @@ def test_a_rested_packing_holds_for_every_push_below_its_energy(path):
     assert "holds for every push of an energy up to" in str(told)
     system = OneSidedSystem.of(path(0.02))
     reach, z = reach_of(system), system.motion.first_order
-    assert np.isinf(reach.time)
+    assert (reach.time, system.motion.energy_norm.positive) == (np.inf, True)
     assert 1 < transient_gain(path(0.02), "energy").gain < reach.gain < 50
-    assert system.motion.energy_norm.positive
     step, state = expm(0.1 * z), np.random.default_rng(0).standard_normal((len(z), 40))
     first = np.sum(state**2, axis=0)
     for _ in range(25):

@@ -35,7 +35,7 @@ def test_no_sampled_propagator_is_larger(cluster, norm, dissipation):
             transient_gain(packing, norm)
         return
     found = transient_gain(packing, norm)
-    times = np.linspace(0, found.window, 400)
+    times = np.linspace(0, found.window, 200)
     assert sampled(packing, norm, times).max() < 1.01 * found.gain
     assert sampled(packing, norm, [found.time])[0] == pytest.approx(found.gain, rel=1e-6)
     assert found.gain <= found.bound * (1 + 1e-9)
@@ -53,15 +53,16 @@ def test_the_gain_is_the_largest_singular_value(path, fx):
     around = sampled(packing, "displacement", found.time + np.array([-step, 0, step]))
     assert around[1] == pytest.approx(found.gain, rel=1e-6)
     assert around.max() <= found.gain * (1 + 1e-9)
-    moved = linear_response(packing, [found.time], initial=found.start).displacement[0]
-    assert np.sum(found.start**2) == pytest.approx(1)
-    assert np.sum(moved**2) == pytest.approx(found.gain, rel=1e-6)
     assert found.gain <= found.bound < 1.5 * found.gain
-    lone = np.zeros(300)
-    lone[[found.disk, 100 + found.disk]] = found.direction
-    pushed = linear_response(packing, [found.time], initial=lone).displacement[0]
+    lone, places = np.zeros(300), [found.disk, 100 + found.disk]
+    lone[places] = found.direction
+    best, pushed = (
+        np.sum(linear_response(packing, [found.time], initial=start).displacement ** 2) for start in (found.start, lone)
+    )
+    assert np.sum(found.start**2) == pytest.approx(1)
+    assert best == pytest.approx(found.gain, rel=1e-6)
     # its part in the best start grows as that does
-    assert np.sum(pushed**2) >= found.gain * np.sum(found.start.reshape(3, -1)[:2, found.disk] ** 2) * (1 - 1e-9)
+    assert pushed >= found.gain * np.sum(found.start[places] ** 2) * (1 - 1e-9)
 
 
 def test_a_symmetric_operator_has_no_gain(reference_packing):

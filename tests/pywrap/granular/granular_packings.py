@@ -1,35 +1,13 @@
 """Packings of LAMMPS's own granular styles, and of ours, as a user's script sets them up."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 RESCALED = ("mindlin_rescale", "mindlin_rescale/force")
-LAWS = {
-    "gran/hooke/history": ("gran/hooke/history 5e2 2e2 {g} {g} 3.0 1", ["* *"], "hooke/history 5e2 2e2 {w} {w} 3.0 1"),
-    "gran/hertz/history": ("gran/hertz/history 3e3 NULL {g} {g} 3.0 1", ["* *"], "hertz/history 3e3 9e2 {w} {w} 3.0 1"),
-    "linear_history": (
-        "granular", ["* * hooke 5e2 {g} tangential linear_history 2e2 1.0 3.0 damping mass_velocity"],
-        "granular hooke 5e2 {w} tangential linear_history 2e2 1.0 3.0 damping velocity",
-    ),
-    "mindlin": (
-        "granular",
-        ["1 1 hertz 3e3 {g} tangential mindlin 9e2 1.0 3.0", "2 2 hertz 5e3 {g} tangential mindlin 2e3 1.0 3.0"],
-        "granular hertz 3e3 {w} tangential mindlin 9e2 1.0 3.0",
-    ),
-    "mindlin/force": (
-        "granular", ["* * hertz/material 3e3 {g} 0.3 tangential mindlin/force NULL 1.0 3.0 damping viscoelastic"],
-        "granular hertz/material 5e3 {w} 0.2 tangential mindlin/force NULL 1.0 3.0",
-    ),
-    "tsuji": (
-        "granular", ["* * hertz 3e3 {e} tangential mindlin/force 9e2 1.0 3.0 damping tsuji"],
-        "granular hertz/material 3e3 {e} 0.3 tangential mindlin/force 9e2 0.5 3.0 damping coeff_restitution",
-    ),
-} | {
-    law: (
-        "granular", [f"* * hertz 3e3 {{g}} tangential {law} 9e2 1.0 3.0"],
-        f"granular hertz 3e3 {{w}} tangential {law} 9e2 1.0 3.0",
-    ) for law in RESCALED
-}  # fmt: skip
+_, *ROWS = (Path(__file__).parent / "laws.txt").read_text().splitlines()
+LAWS = {law: (style, each.split("; "), wall) for law, style, each, wall in (row.split(" | ") for row in ROWS)}
 """Pair style, coefficients and wall, with dashpots g and w, or a restitution e.
 
 The coefficient of friction is 3, so that no contact comes to rest at Coulomb's bound. They are soft: overlaps are a
@@ -39,10 +17,13 @@ ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
-def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3, units: str = "lj") -> str:
+DECKS = Path(__file__).parent / "decks"
+
+
+def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3) -> str:
     """The first commands of a deck: spheres, or disks, in a box."""
     return f"""
-units {units}
+units lj
 dimension {dimension}
 atom_style sphere
 boundary {boundary}
@@ -56,15 +37,15 @@ create_box {kinds} box
 def deck(
     places, law: str, wall: str = "", *, box: str = "block -4 4 -4 4 -2 8", boundary: str = "f f f", dimension: int = 3,
     kinds=(), diameters=(1.0,), load: str = "0 0 -1", more: str = "fix move all nve/sphere", timestep: float = 1e-3,
-    run: str = "run 0", units: str = "lj", fill: str = "", density: str = "density 1.0",
+    run: str = "run 0", fill: str = "",
 ) -> str:  # fmt: skip
     """Particles at some places, or by the commands of `fill`, with one law for pairs and for the plane of a wall, as a
     wall names it."""
     granular, placed = law.startswith("granular "), zip(kinds or [1] * len(places), places, strict=True)
     return "\n".join([
-        head(box, boundary, kinds=len(diameters), dimension=dimension, units=units), fill,
+        head(box, boundary, kinds=len(diameters), dimension=dimension), fill,
         *(f"create_atoms {k} single {x:.17g} {y:.17g} {z:.17g} units box" for k, (x, y, z) in placed),
-        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), f"set group all {density}",
+        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), "set group all density 1.0",
         "pair_style granular" if granular else f"pair_style gran/{law}",
         f"pair_coeff * * {law.removeprefix('granular ') if granular else ''}",
         f"fix floor all wall/gran {law} {wall}" if wall else "",
@@ -74,27 +55,16 @@ def deck(
     ])  # fmt: skip
 
 
-TWO = (
-    head("block -4 4 -4 4 0 8")
-    + """
-create_atoms 1 single 0 0 0.495 units box
-create_atoms 1 single 0 0.6 1.275 units box
-set group all diameter 1.0 density 1
-thermo_style custom step
-"""
-)
+TWO = (DECKS / "two.in").read_text()
 MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 
 
 def instance(log=None):
     """LAMMPS on the ranks of this process, with the plugin."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
     from mpi4py import MPI
 
-    from faultgouge.pywrap.lammps.instance import lammps_instance
+    from faultgouge.pywrap import lammps_instance
 
     return lammps_instance(MPI.COMM_WORLD, log)
 
@@ -120,8 +90,7 @@ def start(lmp, d: int, count: int) -> None:
     across = int(width // 1.05)
     layer = across ** (d - 1)
     for k in range(count):
-        a, b = k % layer % across, k % layer // across
-        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
+        x, y = (np.array([k % layer % across, k % layer // across]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
         height = 0.55 + 1.02 * (k // layer)
         place = (x, y, height) if d == 3 else (x, height, 0.0)
         lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")
@@ -130,13 +99,10 @@ def start(lmp, d: int, count: int) -> None:
 
 def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str = "3.0") -> None:
     style, coefficients, wall = LAWS[law]
-    style, wall, *coefficients = (each.replace(" 3.0", f" {mu}") for each in (style, wall, *coefficients))
-    lmp.command(f"pair_style {style.format(g=g)}")
-    for each in coefficients:
-        lmp.command(f"pair_coeff {each.format(g=g, e=e[0])}")
-    plane = "zplane" if d == 3 else "yplane"
+    lines = [f"pair_style {style.format(g=g)}", *(f"pair_coeff {each.format(g=g, e=e[0])}" for each in coefficients)]
     if w:
-        lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
+        lines.append(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {'zy'[d == 2]}plane 0 NULL contacts")
+    command(lmp, "\n".join(lines).replace(" 3.0", f" {mu}"))
 
 
 def on_slope(log, law: str, d: int, slope, dashpots=("40", "40"), e=("", ""), mu: str = "3.0", run: int = 0):
@@ -174,12 +140,3 @@ def of_particle(lmp, name: str, number: int) -> np.ndarray:
     """The row of an array that belongs to the particle with this ID, which can be changed."""
     row = int(np.flatnonzero(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")] == number)[0])
     return lmp.numpy.extract_atom(name)[row]
-
-
-def state(lmp) -> np.ndarray:
-    """All that moves, in the order of the IDs."""
-    count = lmp.extract_setting("nlocal")
-    names = ("x", "v", "omega", "f", "torque")
-    ids = np.array(lmp.numpy.extract_atom("id")[:count], dtype=float)[:, None]
-    rows = np.hstack([ids, *(lmp.numpy.extract_atom(name)[:count] for name in names)])
-    return rows[np.argsort(rows[:, 0])]

@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 from granular_packings import command
 
+from faultgouge.analysis import one_sided_motion
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
 
 PUSH = 1e-7
 """Length / time. Displacements stay below 1e-5."""
 
 
-def velocities(here, push):
-    """Pushes of all coordinates as velocities of the particles, shape (P, N, d)."""
-    return [column.reshape(here.axes, len(here))[: here.dimension].T for column in push.T]
+def motion_after(packing, push, times):
+    """The one-sided motion after a push of all coordinates, shape (.., 1), as velocities of the particles."""
+    here = packing.configuration
+    velocity = push[:, 0].reshape(here.axes, len(here))[: here.dimension].T
+    return one_sided_motion(packing, velocity, times=times)
 
 
 def in_a_quiet_copy(lmp, work, lines=""):
@@ -44,11 +47,10 @@ def pushed(lmp, here, push, times, dt, size=PUSH):
     low, high, *_ = lmp.extract_box()
 
     def follow(velocity):
-        at_rest, found, steps = places(lmp, here), [], 0
+        at_rest, found = places(lmp, here), []
         set_velocity(lmp, here, size * velocity)
-        for time in times:
-            lmp.command(f"run {round(time / dt) - steps} post no")
-            steps = round(time / dt)
+        for steps in np.diff(np.rint(np.array(times) / dt).astype(int), prepend=0):
+            lmp.command(f"run {steps} post no")
             away = places(lmp, here) - at_rest
             away[:, 0] -= (high[0] - low[0]) * np.round(away[:, 0] / (high[0] - low[0]))
             found.append(float(np.mean(np.sum(away**2, axis=1))) / size**2)
@@ -71,9 +73,9 @@ def in_steps(here, push, times, dt):
     """D of the one-sided motion in LAMMPS's own steps, shape (T,): fast motions of different phase add up to D, and
     what the step changes their phases by is not small."""
     system = OneSidedSystem.of(here)
-    state, steps, found = system.start(push), 0, []
-    for time in times:
-        for _ in islice(system.steps(state, dt), round(time / dt) - steps):
-            steps += 1
+    state, found = system.start(push), []
+    for steps in np.diff(np.rint(np.array(times) / dt).astype(int), prepend=0):
+        for _ in islice(system.steps(state, dt), steps):
+            pass
         found.append(np.sum(system.displacement(state.z)[..., 0] ** 2, axis=1).mean())
     return np.array(found)

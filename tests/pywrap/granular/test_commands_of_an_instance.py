@@ -37,17 +37,8 @@ def test_what_is_refused(two, more, changes, says):
     assert "\n" not in str(refusal.value)
 
 
-PRINTS = '''print "pair_style gran/hooke/history 1 1 1 1 1 1"
-variable word index clear
-print "${word}"
-print "${word}" screen no
-pair_coeff * *
-print clear
-print """
-clear
-fix move all nve/limit 1
-"""
-'''
+PRINTS = 'print "pair_style gran/hooke/history 1 1 1 1 1 1"\nvariable word index clear\nprint "${word}"\n'
+PRINTS += 'print "${word}" screen no\npair_coeff * *\nprint clear\nprint """\nclear\nfix move all nve/limit 1\n"""\n'
 RUNS = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
 
 
@@ -59,11 +50,9 @@ def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path, more):
     (tmp_path / "deck.in").write_text("\n".join([f"log {tmp_path}/own.log", told[0], *told[2:], more, ""]))
     lmp.file(str(tmp_path / "deck.in"))
     # one text is as good as many lines, and a comment is none of the command
-    text = "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"])
-    found = faultgouge.from_lammps(lmp, balance=np.inf)
-    assert (
-        found == faultgouge.from_lammps(lmp, told, balance=np.inf) == faultgouge.from_lammps(lmp, text, balance=np.inf)
-    )
+    text = "\n".join(told) + "  # ${comment}"
+    found, other, same = (faultgouge.from_lammps(lmp, each, balance=np.inf) for each in (None, told, text))
+    assert found == other == same
     assert found.free.all()  # by fix move
 
 

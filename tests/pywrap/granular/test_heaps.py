@@ -6,7 +6,7 @@ apart. Its torque R n x f has a spring and a dashpot of the relative rotation, a
 
 import numpy as np
 import pytest
-from granular_packings import agree, command, deck, is_proved
+from granular_packings import MOVES, agree, command, is_proved
 from pushes import in_steps, pushed
 
 import faultgouge
@@ -23,16 +23,8 @@ def heap(lammps_with):
 
     def make(law: str, mu: float, damped: bool, seed: int, count: int):
         model, wall = (MODEL.format(*each, law=law, mu=mu) for each in (DAMPED, DAMPED if damped else UNDAMPED))
-        tube = "region tube cylinder z 0 0 0.008 0.0025 0.05 units box"
-        side = "region side cylinder z 0 0 0.012 -0.001 0.06 units box side in"
-        walls = f"pair_coeff * * {model}\n{side}\nfix side all wall/gran/region granular {model} region side"
-        lmp = lammps_with(deck(
-            [], f"granular {wall}", "zplane 0 NULL contacts", box="block -0.03 0.03 -0.03 0.03 -0.001 0.06", load="",
-            fill=f"{tube}\ncreate_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000", units="si",
-            diameters=(0.004,), density="density 2500", timestep=1e-5,
-            more=f"{walls}\nfix load all gravity 9.81 vector 0 0 -1\nfix move all nve/sphere",
-            run="run 15000 post no\nunfix side\nrun 20000 post no",
-        ))  # fmt: skip
+        texts = {"model": model, "wall": wall, "seed": seed, "count": count}
+        lmp = lammps_with("\n".join(f'variable {name} string "{text}"' for name, text in texts.items()), "heap.in")
         faultgouge.relax(lmp)
         if not damped:
             lmp.command(f"pair_coeff * * {wall}")
@@ -62,8 +54,7 @@ def test_a_heap_after_pushes(heap, which):
     assert (told.stable, told.at_bound, told.rolling_at_bound > 0) == (which != "grows", 0, rolls)
     assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is rolls
     times, size = ([0.05, 0.1, 0.2, 0.4], 1e-10) if which == "grows" else ([0.02, 0.05, 0.1, 0.2], 1e-8)
-    push = random_pushes(here, 1)
-    timestep = 0.1 * float(stable_timestep(here))
+    push, timestep = random_pushes(here, 1), 0.1 * float(stable_timestep(here))
     found = pushed(lmp, here, push, times, timestep, size)
     expected = [in_steps(here, each[:, None], times, timestep) for each in push.T]
     np.testing.assert_allclose(np.transpose(expected), found, rtol=0.01)
@@ -85,8 +76,7 @@ def test_the_law_of_two_spheres_and_a_wall(two, tmp_path, mu):
     from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
     law = f"hertz 1e5 1 tangential mindlin 3e4 1.0 {mu} rolling sds 7e2 0.3 0.02"
-    wall = f"fix w all wall/gran granular {law} zplane 0 NULL"
-    lmp, told = two("granular", f"* * {law}", f"{wall}\nfix move all nve/sphere")
+    lmp, told = two("granular", f"* * {law}", f"fix w all wall/gran granular {law} zplane 0 NULL{MOVES}")
     lmp.numpy.extract_atom("omega")[:] = [0.2, 0.1, 0.0]
     command(lmp, "timestep 1e-6\nrun 3 post no")
     found = faultgouge.from_lammps(lmp, told, balance=np.inf, prove=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granular_packings import command, instance, start, state, with_law
+from granular_packings import command, instance, start, with_law
 from reference_layer import on_ranks
 
 import faultgouge
@@ -21,6 +21,14 @@ def sliding(log, count: int, slope: float, law: str, timestep: float, more: str)
     with_law(lmp, law, 3, "100", "100", ("", ""))
     command(lmp, f"fix load all gravity 1.0 vector {slope} 0 -1\nfix move all nve/sphere\ntimestep {timestep}\n{more}")
     return lmp
+
+
+def state(lmp) -> np.ndarray:
+    """All that moves, in the order of the IDs."""
+    count = lmp.extract_setting("nlocal")
+    arrays = (lmp.numpy.extract_atom(name)[:count] for name in ("id", "x", "v", "omega", "f", "torque"))
+    rows = np.column_stack(list(arrays))
+    return rows[np.argsort(rows[:, 0])]
 
 
 def test_a_look_changes_nothing(tmp_path):
@@ -38,10 +46,9 @@ def test_a_look_changes_nothing(tmp_path):
         ends.append(state(lmp))
         lmp.close()
     assert np.array_equal(*ends)
-    for name in ("dump", "mean"):
-        assert (tmp_path / f"{name}0").read_bytes() == (tmp_path / f"{name}2").read_bytes()
-    one, other = ((tmp_path / f"log{looks}").read_text().count("run ") for looks in (0, 2))
-    assert one == other
+    one, other = ([(tmp_path / f"{name}{looks}").read_text() for name in ("dump", "mean", "log")] for looks in (0, 2))
+    assert one[:2] == other[:2]
+    assert one[2].count("run ") == other[2].count("run ")
 
 
 @pytest.mark.parametrize(("style", "columns"), [("custom/gz", "id x y z vx vy vz fx fy fz"), ("xyz/gz", "")])
@@ -49,13 +56,12 @@ def test_a_look_leaves_compressed_dumps_whole(tmp_path, style, columns):
     """zlib writes the rest of a file when it is closed, as a copy of the process would at the place that both share."""
     dump = f"dump 1 all {style} 10 {tmp_path}/dump.gz {columns}\nrun 1995"
     lmp = sliding(tmp_path / "log.lammps", 18, 0.2, "gran/hertz/history", 0.002, dump)
-    own = (tmp_path / "own.txt").open("w")
-    own.write("what a user's script has written")
-    for _ in range(2):
-        faultgouge.from_lammps(lmp, balance=np.inf)
-        lmp.command("run 1000")
-    lmp.close()
-    own.close()
+    with (tmp_path / "own.txt").open("w") as own:
+        own.write("what a user's script has written")
+        for _ in range(2):
+            faultgouge.from_lammps(lmp, balance=np.inf)
+            lmp.command("run 1000")
+        lmp.close()
     text = gzip.decompress((tmp_path / "dump.gz").read_bytes()).decode()
     assert len(re.findall(r"(?m)^(ITEM: TIMESTEP$| ?Atoms\. Timestep)", text)) == 400
     assert text.count("\n") == 400 * (18 + (9 if columns else 2))

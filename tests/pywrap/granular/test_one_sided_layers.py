@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pushes import PUSH, velocities
+from pushes import PUSH, motion_after
 
-from faultgouge.analysis import one_sided_motion, stability
+from faultgouge.analysis import stability
 from faultgouge.analysis.motion.pushes import random_pushes
 
 
@@ -18,8 +18,7 @@ def layer():
     from research.laws.both_laws import as_slider, at_loads
     from research.modes.loss import with_dashpots
 
-    found = []
-    parts = {"packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0}}
+    found, parts = [], {"packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0}}
     scene = Scene.from_mapping(parts | {"ramp": {"step": 3e-3, "until": 0.6}, "modes": {"fx_over_fy": [0.2]}})
     start = settle(scene)
     at_loads(scene, replace(start, packing=as_slider(start.packing)), lambda packing: found.append(packing) or {})
@@ -46,8 +45,7 @@ def pushed_layer(packing, push, times, size=PUSH):
 
 def compared(packing, push, times, agrees):
     """D over the push squared as the plugin has it, where one-sided motion has the same; and the one-sided motion."""
-    (velocity,), found = velocities(packing.configuration, push), pushed_layer(packing, push[:, 0], times)
-    expected = one_sided_motion(packing, velocity, times=times)
+    found, expected = pushed_layer(packing, push[:, 0], times), motion_after(packing, push, times)
     np.testing.assert_allclose(found, expected.mean_square_displacement, rtol=agrees)
     return found, expected
 
@@ -112,15 +110,15 @@ def test_with_loss_particles_stay_displaced(far_from_the_bound):
 def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
     """The size does not depend on when the motion is looked at, as contacts go farthest at the beginning."""
     packing = far_from_the_bound(20.0)
-    here, push = packing.configuration, random_pushes(packing.configuration, 1)[:, 0]
-    velocity, times = velocities(here, push[:, None])[0], np.array([0.5, 1.0, 2.0])
-    expected = one_sided_motion(packing, velocity, times=times)
-    _, most = expected.scales
-    assert one_sided_motion(packing, velocity, times=np.linspace(0.0, 2.0, 4001)).scales[1] == pytest.approx(most, 0.05)
-    assert stability(packing).largest_energy < 0.5 * np.sum(here.coordinate_mass * (most * push) ** 2)
-    d = expected.mean_square_displacement
-    np.testing.assert_allclose(pushed_layer(packing, push, times, size=0.1 * most), d, rtol=0.1)
-    assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)
+    here, times = packing.configuration, np.array([0.5, 1.0, 2.0])
+    push = random_pushes(here, 1)[:, :1]
+    expected = motion_after(packing, push, times)
+    most, d = expected.scales[1], expected.mean_square_displacement
+    assert motion_after(packing, push, np.linspace(0.0, 2.0, 4001)).scales[1] == pytest.approx(most, 0.05)
+    assert stability(packing).largest_energy < 0.5 * np.sum(here.coordinate_mass * (most * push[:, 0]) ** 2)
+    small, large = (pushed_layer(packing, push[:, 0], times, size=share * most) for share in (0.1, 20))
+    np.testing.assert_allclose(small, d, rtol=0.1)
+    assert np.any(np.abs(large / d - 1) > 0.5)
 
 
 @pytest.mark.long

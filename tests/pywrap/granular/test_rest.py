@@ -41,48 +41,44 @@ def test_velocities_of_what_is_taken_at_rest(lammps_with):
     for differences in (False, True):
         held, moves = faultgouge.from_lammps(lmp, differences=differences).remarks[-2:]
         assert held.startswith("1 particle that no fix moves has velocities or rotations, up to 0.1 at the surface")
-        assert moves == "particles move by up to 0.1 (length / time): this is said of them at rest"
+        assert moves.startswith("particles move by up to 0.1 ")
     lmp.commands_string("set group held omega 0 0 0\nvelocity all set 0 0 0")
     assert not any("move" in each for each in faultgouge.from_lammps(lmp).remarks)
 
 
-ENDS = "variable high equal 1\nfix stop all halt 10 v_high > 0 error soft message no\nrun 20"
-
-
 def test_a_run_that_fix_halt_ends_brings_nothing_to_rest(lammps_with):
     """LAMMPS skips all further runs without a word."""
-    lmp = lammps_with(ball(0.5, run=ENDS))
+    ends = "variable high equal 1\nfix stop all halt 10 v_high > 0 error soft message no\nrun 20"
+    lmp = lammps_with(ball(0.5, run=ends))
     with refused(r"^LAMMPS ended a run while the packing came to rest, as fix halt and"):
         faultgouge.relax(lmp)
     lmp.commands_string("unfix stop\ntimer timeout unlimited")
-    for balance in (np.nan, -1.0):
-        with pytest.raises(BadInputError, match=f"^balance = {balance:g} is refused"):
-            faultgouge.relax(lmp, balance=balance)
+    with pytest.raises(BadInputError, match=r"^balance = -1 is refused"):
+        faultgouge.relax(lmp, balance=-1.0)
     assert faultgouge.relax(lmp) < 1e-8
 
 
 SHAKES = "fix heat all langevin 1e-6 1e-6 1.0 4711"
 CREEPS = "opposes velocities alone and bears no"
 NO_HISTORY = "granular hooke 1e4 20 tangential linear_nohistory 10 0.5"
-LOST = {"more": "group one id 1\nunfix floor\nfix floor one wall/gran " + f"{LAW} {PLANE}", "z": AT_REST}
+LOST = f"group one id 1\nunfix floor\nfix floor one wall/gran {LAW} {PLANE}"
 SWINGS = "variable f equal 0.05*sin(step*0.001)\nfix swing all addforce v_f 0 0"
 RESTLESS = [
-    ({"more": SHAKES}, "in 10000 steps: .*; fix heat langevin shakes the particles by its temperature: unfix it"),
+    (ball(0.4999, more=SHAKES), "in 10000 steps: .*; fix heat langevin shakes the particles by its temperature: unfix"),
     # without a tangential spring a sphere on a slope creeps
-    ({"law": "hooke 1e4 3e3 20 10 0.5 1", "load": "0.1 0 -1"}, f"; the friction of gran/hooke {CREEPS}"),
-    ({"law": NO_HISTORY, "load": "0.1 0 -1"}, f"; the friction of linear_nohistory {CREEPS}"),
-    ({"more": SWINGS}, "^LAMMPS's forces change with the time, though nothing moves: a load, a wall or a region"),
-    ({**LOST, "others": [(2, 0, -1)]}, "^1 particle left the box while the packing came to rest: delete"),
+    (ball(0.4999, law="hooke 1e4 3e3 20 10 0.5 1", load="0.1 0 -1"), f"; the friction of gran/hooke {CREEPS}"),
+    (ball(0.4999, law=NO_HISTORY, load="0.1 0 -1"), f"; the friction of linear_nohistory {CREEPS}"),
+    (ball(0.4999, more=SWINGS), "^LAMMPS's forces change with the time, though nothing moves: a load, a wall or"),
+    (ball(AT_REST, (2, 0, -1), more=LOST), "^1 particle left the box while the packing came to rest: delete"),
 ]
 
 
-@pytest.mark.parametrize(("changes", "says"), RESTLESS)
-def test_what_keeps_a_packing_from_resting_is_named(lammps_with, changes, says):
-    given = {"z": 0.4999, "others": []} | changes
-    lmp = lammps_with(ball(given.pop("z"), *given.pop("others"), **given))
+@pytest.mark.parametrize(("lines", "says"), RESTLESS)
+def test_what_keeps_a_packing_from_resting_is_named(lammps_with, lines, says):
+    lmp = lammps_with(lines)
     with pytest.raises(FaultgougeError, match=says):
         faultgouge.relax(lmp, steps=10_000)
-    if changes.get("more") == SHAKES:  # it is a drag where its temperature is zero
+    if SHAKES in lines:  # it is a drag where its temperature is zero
         lmp.command(SHAKES.replace("1e-6", "0.0"))
         assert faultgouge.relax(lmp) < 1e-8
 
@@ -97,12 +93,10 @@ def test_a_packing_so_stiff_that_rounding_moves_it(lammps_with):
 
 def test_what_falls_or_flies_comes_to_rest(lammps_with):
     """Nothing touches anything in the first steps, so that nothing is out of balance; or drag alone acts."""
-    lmp = lammps_with(ball(6.0))
-    faultgouge.relax(lmp)
+    faultgouge.relax(lmp := lammps_with(ball(6.0)))
     assert len(faultgouge.from_lammps(lmp).contacts) == 1
     lmp = lammps_with(ball(4.0, wall="", load="", more="velocity all set 0.1 0 0.2"), log="log.flies")
-    assert faultgouge.relax(lmp, steps=20_000) == 0.0
-    assert np.all(lmp.numpy.extract_atom("v")[:1] == 0.0)
+    assert (faultgouge.relax(lmp, steps=20_000), *lmp.numpy.extract_atom("v")[0]) == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_a_packing_of_rrespa(lammps_with):
