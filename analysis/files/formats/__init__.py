@@ -91,11 +91,10 @@ def format_of(path: Path) -> Format:
     found = READERS.get(Path(name).suffix) or {"data": DATA, "dump": DUMP}.get(name.split(".")[0])
     if found is None and begins_with(path, RESTART_BEGINNING):
         return RESTART
-    if found is None and is_hdf5(path):
-        raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
     if found is None:
-        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data"
-        raise PackingFileError(f"{path} is of no format that is read: give {names}, run.h5, or a LAMMPS deck (.in).")
+        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data, or a LAMMPS deck (.in)"
+        needs = "run.h5 needs no import: packing.file, draw and spectrum take it"
+        raise PackingFileError(f"{path} is of no format that is read: give {names}; a {needs}.")
     return found
 
 
@@ -128,10 +127,10 @@ def _function(name: str) -> Any:
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
-    taken, what = (FILMS, "several frames go into") if frames else (tuple(WRITERS)[:-1], "exports are")
-    if path.suffix not in taken:
-        more = "" if frames else "; for a .pvd add --frames all"
-        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}{more}; give it one of these suffixes.")
+    one = tuple(WRITERS)[:-1]
+    if path.suffix not in (FILMS if frames else one):
+        ways = f"exports are {', '.join(one)}, and with --frames {', '.join(FILMS)}"
+        raise BadInputError(f"-o {path}: {ways}; give it one of these suffixes.")
     if modes and path.suffix in (".data", ".csv"):
         raise BadInputError(f"-o {path}: it has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
