@@ -263,25 +263,16 @@ LATER = "format 2 of faultgouge's files, and this version knows 1: a later versi
      ("atomic_write", "run.h5"), ("atomic_write", "configuration.h5")],
 )  # fmt: skip
 def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module, name):
-    """And one without a number, of an older version, is read."""
-
-    def write(constant, value):
-        (tmp_path / name).unlink(missing_ok=True)
-        with monkeypatch.context() as version:
-            version.setattr(f"faultgouge.analysis.files.{module}.{constant}", value)
-            if name == "configuration.h5":
-                write_configuration(tmp_path / name, configuration)
-            elif name == "run.h5":
-                with RunFile.create(tmp_path / name, sheared) as file:
-                    file.append(sheared)
-            else:
-                write_packing(tmp_path / name, sheared)
-
-    write("FORMAT", 2)
+    with monkeypatch.context() as version:
+        version.setattr(f"faultgouge.analysis.files.{module}.FORMAT", 2)
+        if name == "configuration.h5":
+            write_configuration(tmp_path / name, configuration)
+        elif name == "run.h5":
+            RunFile.create(tmp_path / name, sheared).close()
+        else:
+            write_packing(tmp_path / name, sheared)
     with pytest.raises(PackingFileError, match=LATER):
         load(tmp_path / name)
-    write("FORMAT_KEY", "another_name_123")
-    assert len(load(tmp_path / name)) == len(sheared)
 
 
 def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):

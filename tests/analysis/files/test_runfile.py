@@ -110,13 +110,6 @@ def sound(tmp_path, states):
     return path
 
 
-def test_frames_of_a_trajectory_carry_the_load_of_its_equilibrium(sound, states):
-    with RunFile(sound, "a") as run:
-        run.append_trajectory([0.5, 1.0], [states[-1].position] * 2)
-    with h5py.File(sound) as file:
-        assert file["observables/fx/value"][()].tolist() == [each.fx for each in (*states, *2 * states[-1:])]
-
-
 @HERTZ
 def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
     def cut_short():
