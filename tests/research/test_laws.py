@@ -55,10 +55,8 @@ def test_the_response_below_the_onset_has_the_power_of_an_exceptional_point():
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAMMPS_LAWS)
 def test_lammps_takes_the_forces_of_all_contacts_over(reference_packing, tmp_path, law):
-    packing = reference_packing(0.3)
+    packing = reference_packing(0.3, shares=0.5 * np.sin(np.arange(300)))
     packing = replace(packing, fx=0.3 * packing.fy)
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    packing = replace(packing, contacts=packing.contacts.slipped(0.5 * np.sin(np.arange(len(limit))) * limit))
     lmp = lammps_instance(MPI.COMM_SELF, tmp_path / "log")
     stand(lmp, law, packing, 100.0, tmp_path)
     found = from_lammps(lmp, balance=np.inf).contacts
@@ -97,10 +95,7 @@ def test_pages_have_the_counts_of_the_tables():
 
 
 def test_the_slider_takes_the_forces_over(reference_packing):
-    packing = reference_packing(0.3)
-    limit = packing.law.slip_limit(packing.geometry.overlap)
-    slip = np.resize([-1.0, 0.05, 0.5, 0.99, 1.0], len(limit)) * limit
-    packing = replace(packing, contacts=packing.contacts.slipped(slip))
+    packing = reference_packing(0.3, shares=[-1.0, 0.05, 0.5, 0.99, 1.0])
     other = as_slider(packing)
     forces = [each.law.tangential_force(each.geometry.overlap, each.contacts.slip) for each in (packing, other)]
     # two roots and a quotient; forces are a few units of the load
