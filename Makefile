@@ -19,7 +19,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 # pip would make byte code of all that is installed, one file after the other; COMPILE leaves tests out, on all cores.
-# Where PYTHONDONTWRITEBYTECODE is set a command would otherwise compile what it imports at each start; tests keep theirs.
+# Where PYTHONDONTWRITEBYTECODE is set a command would otherwise compile what it imports at each start, as tests do once.
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib/python3*/site-packages || true
 PYTEST := PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q

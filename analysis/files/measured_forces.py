@@ -12,11 +12,10 @@ contacts   ``step, id1, id2, f_t, f_n``; f_t along n turned by 90 degrees; walls
 J. E. Kollmer, K. E. Daniels, J. M. Schwarz and S. Henkes, Phys. Rev. Lett. 126, 088002, 2021.) The sign of all f_t that
 balances the forces better is taken.
 
-**What they tell.** Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come
-from the small asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions
-without stiffness, and in how many draws of the forces from their errors the linearised packing is unstable. A load on
-each disk balances each such packing, and no motion of a real packing or of LAMMPS's is beside these verdicts. The error
-of f_n is read off the two sides of the contacts. A table whose sides are equal, or that has one, does not tell it.
+Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come from the small
+asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions without
+stiffness, and in how many draws of the forces from their errors the linearised packing, balanced by a load on each
+disk, is unstable. The error of f_n is read off the two sides of the contacts; equal sides, or one, do not tell it.
 """
 
 from __future__ import annotations

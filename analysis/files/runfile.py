@@ -249,10 +249,9 @@ class RunFile(AbstractContextManager["RunFile"]):
         count, given = len(self), self._parameters
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
-        seen = {name: self.observable(name)[frame % count] for name in ("contacts", "angle", "fx", "fy")}
-        if "position_low" in self.observables:
-            seen["position_low"] = self.observable("position_low")[frame % count]
-        rows = seen.pop("contacts")
+        stored = [name for name in ("angle", "fx", "fy", "position_low") if name in self.observables]
+        seen = {name: self.observable(name)[frame % count] for name in stored}
+        rows = self.observable("contacts")[frame % count]
         known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
         names = ("radius", "mass", "inertia_factor", "box_length", "drag_time", "spring")
         with telling(self.path, "is damaged", ValueError):  # numbers that no packing has

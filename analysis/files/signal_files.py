@@ -19,19 +19,10 @@ from .formats.tables import columns_of, strip_comments
 
 
 def read_signal(path: str | Path, channel: str | None = None) -> Signal:
-    """A signal from a file.
+    """A signal from a file of two columns, time and value, with spaces or a comma between them, and comments after #.
 
-    Parameters
-    ----------
-    path : str or Path
-        Two columns, time and value, separated by spaces or a comma, with comments after #; or a record.
-    channel : str, optional
-        Which trace of a record with several: its id, as in BW.RJOB..EHZ, or the end of that.
-
-    Raises
-    ------
-    SignalError
-        If there is no such file, or it holds no signal.
+    Or from a record, of which `channel` is the id of a trace, as in BW.RJOB..EHZ, or the end of that. Raises
+    SignalError if there is no such file, or it holds no signal.
     """
     path = Path(path)
     try:

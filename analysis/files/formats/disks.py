@@ -217,24 +217,10 @@ def mass_of_density(density: Floats, radius: Floats) -> Floats:
 
 
 def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: float | None) -> Packing:
-    """Make a packing of disks under a law and a load.
+    """A packing of disks under a law and a load (fx, fy, inertia_factor, drag_time), with an upper layer, shape (N,).
 
-    Parameters
-    ----------
-    top : ndarray of bool, shape (N,)
-        The upper layer.
-    **load : float
-        fx, fy, inertia_factor, drag_time as for :class:`~faultgouge.analysis.Packing`.
-
-    Returns
-    -------
-    Packing
-        With slips that are not known, if there is friction, and the file does not give the slips of the contacts.
-
-    Raises
-    ------
-    PackingFileError
-        If disks lie below the floor or inside one another, or form no packing.
+    Its slips are not known if there is friction and the file does not give the slips of the contacts. Raises
+    PackingFileError if disks lie below the floor or inside one another, or form no packing.
     """
     place, radius, period, source = disks.position, disks.radius, disks.box_length, disks.source
     with telling(source, "describes no possible packing", ValueError):
@@ -265,35 +251,21 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
         return listed
     slip = {(i, j): s for i, j, s in zip(*(each.tolist() for each in (listed.i, listed.j, listed.slip)), strict=True)}
     found = near.slipped(np.array([slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]))
-    for (i, j), size in slip.items():
-        if size:
-            both = f"{disks.id[i]} and {disks.id[j] if j >= 0 else 'the floor'}"
-            says = f"{both} have a slip and do not touch: leave such rows out, or give places and radii that touch"
-            raise PackingFileError(f"{disks.source}: {says}.")
+    for i, j in (pair for pair, size in slip.items() if size):
+        both = f"{disks.id[i]} and {disks.id[j] if j >= 0 else 'the floor'}"
+        says = f"{both} have a slip and do not touch: leave such rows out, or give places and radii that touch"
+        raise PackingFileError(f"{disks.source}: {says}.")
     return found
 
 
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
-    """Select the disks of the upper layer.
+    """The disks of the upper layer, as booleans, shape (N,).
 
-    Parameters
-    ----------
-    says : str or int, optional
-        A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
-        (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
-        layer of the file. Of a packing of which less than half touches something, which is not at rest yet, a number
-        is one of the highest of all disks.
-    key : str
-        What stands before the text where the user gives it, for messages.
-
-    Returns
-    -------
-    ndarray of bool, shape (N,)
-
-    Raises
-    ------
-    BadInputError
-        If no upper layer is given, the text is not understood, or it selects no disk.
+    `says` is a number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``,
+    ``ids:@FILE`` (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and"; by default the
+    upper layer of the file. Of a packing of which less than half touches something, which is not at rest yet, a number
+    is one of the highest of all disks. `key` is what stands before the text where the user gives it. Raises
+    BadInputError if no upper layer is given, the text is not understood, or it selects no disk.
     """
     y = disks.position[:, 1]
     if says is None and disks.top is None:

@@ -8,6 +8,7 @@ the floor, and low parts of compensated packings are a fourth column.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -180,13 +181,13 @@ def choose_frames(run: RunFile, says: str) -> range:
     Raises BadInputError if the text is neither, or selects no frame.
     """
     total = 1 + len(run.series("trajectory")["time"]) if "trajectory" in run.names_of_series else len(run)
-    try:
+    found = range(0)
+    with suppress(ValueError, TypeError):
         start, stop, *step = (int(part) if part else None for part in says.replace("all", ":").split(":"))
         found = range(total)[slice(start, stop, *step)]
-    except (ValueError, TypeError):
-        raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.") from None
     if not found:
-        raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
+        ways = "give all, START:STOP or START:STOP:STEP, counted from 0"
+        raise BadInputError(f"--frames {says} means none of the {total} frames of {run.path}: {ways}.")
     return found
 
 

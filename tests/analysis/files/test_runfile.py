@@ -110,13 +110,6 @@ def sound(tmp_path, states):
     return path
 
 
-def test_frames_of_a_trajectory_carry_the_load_of_its_equilibrium(sound, states):
-    with RunFile(sound, "a") as run:
-        run.append_trajectory([0.5, 1.0], [states[-1].position] * 2)
-    with h5py.File(sound) as file:
-        assert file["observables/fx/value"][()].tolist() == [each.fx for each in (*states, *2 * states[-1:])]
-
-
 @HERTZ
 def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
     def cut_short():
@@ -183,8 +176,6 @@ def test_broken_missing_and_foreign_files(sound, change, says):
 
 
 NAME = "faultgouge/more/msd"
-VIRTUAL = h5py.VirtualLayout((4,), "f8")
-VIRTUAL[:] = h5py.VirtualSource("other.h5", "data", (4,))
 
 
 @HERTZ
@@ -193,7 +184,7 @@ VIRTUAL[:] = h5py.VirtualSource("other.h5", "data", (4,))
     [
         lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}),
         lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]),
-        lambda file: file.create_virtual_dataset(NAME, VIRTUAL),
+        lambda file: file.create_virtual_dataset(NAME, h5py.VirtualLayout((4,), "f8")),
     ],
 )
 def test_what_is_not_in_the_file_is_refused(sound, add):

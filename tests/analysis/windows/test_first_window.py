@@ -92,7 +92,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
 @pytest.mark.slow
 def test_first_window_of_the_reference(ramp, mu, expected, last):
     path = ramp(mu, 1e-3, 22)
-    found = find_onset(path, path.grid[last - 4 : last + 1], limits=Limits(all_windows=50))
+    found = find_onset(path, path.grid[last - 2 : last + 1], limits=Limits(all_windows=50))
     assert not found.complete
     (window,) = found.windows
     assert window.kind == "coalescence"
