@@ -76,7 +76,7 @@ HIDDEN = f"echo none\npair_style {HERTZ.replace('NULL', '2e3')}\npair_coeff * *\
 @pytest.mark.parametrize(
     ("lines", "run", "says"),
     [(RISES, 0, "^LAMMPS's forces change with the time, though nothing moves: a load, "),
-     (HIDDEN, 60000, "as K says: .*some are not in the log")],
+     (HIDDEN, 20000, "as K says: .*some are not in the log")],
 )  # fmt: skip
 def test_a_load_that_follows_the_time_and_a_log_that_lacks_commands(spheres, lines, run, says):
     """A gravity that rises by a millionth a step is no force by positions."""

@@ -94,7 +94,7 @@ def test_a_packing_so_stiff_that_rounding_moves_it(lammps_with):
 
 def test_what_falls_or_flies_comes_to_rest(lammps_with):
     """Nothing touches anything in the first steps, so that nothing is out of balance; or drag alone acts."""
-    faultgouge.relax(lmp := lammps_with(ball(6.0)))
+    faultgouge.relax(lmp := lammps_with(ball(1.5)))
     assert len(faultgouge.from_lammps(lmp).contacts) == 1
     lmp = lammps_with(ball(4.0, wall="", load="", more="velocity all set 0.1 0 0.2"), log="log.flies")
     assert (faultgouge.relax(lmp, steps=20_000), *lmp.numpy.extract_atom("v")[0]) == (0.0, 0.0, 0.0, 0.0)
