@@ -19,7 +19,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 # pip would make byte code of all that is installed, one file after the other; COMPILE leaves tests out, on all cores.
-# Where PYTHONDONTWRITEBYTECODE is set a command would otherwise compile what it imports at each start.
+# Where PYTHONDONTWRITEBYTECODE is set a command would otherwise compile what it imports at each start, as tests do once.
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib/python3*/site-packages || true
 PYTEST := PYTHONPATH=$(CURDIR)/src $(BIN)/python -m pytest -q
@@ -41,11 +41,11 @@ reproduce: $(VENV)/.installed
 test: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m "not long"
 
-long: $(VENV)/.test
+long: $(VENV)/.long
 	$(PYTEST) -n 2 --dist worksteal -m long
 
 DAY ?= $(shell date +%j)
-turn: $(VENV)/.test
+turn: $(VENV)/.long
 	$(PYTEST) -n 2 --dist worksteal -m long --turn $(DAY)
 
 plugin: $(VENV)/.plugin
@@ -140,6 +140,10 @@ $(VENV)/.installed: $(VENV)/.plugin $(PYTHON_SOURCES)
 
 $(VENV)/.test: $(VENV)/.plugin
 	$(PIP) --group test
+	touch $@
+
+$(VENV)/.long: $(VENV)/.test
+	$(PIP) --group long
 	touch $@
 
 $(VENV)/.check: $(VENV)/.test

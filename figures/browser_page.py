@@ -128,7 +128,7 @@ def write_view(
         "gradient": ", ".join(_colours(8)),
         "legend": " ".join(words for words, shown in kinds.items() if shown),
     }
-    write_text(path, filled(f"{__package__}.view", "page.html.j2", data, autoescape=True))
+    write_text(path, filled(__package__ or "", "view/page.html.j2", data, autoescape=True))
 
 
 class _Images(NamedTuple):

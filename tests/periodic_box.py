@@ -1,5 +1,7 @@
 """Disks and spheres at rest in a periodic box of LAMMPS, with friction and a shear behind them."""
 
+from pathlib import Path
+
 import numpy as np
 
 
@@ -16,37 +18,13 @@ def at_rest(d: int, log, count: int = 40, seed: int = 1):
     edge = float(fill ** (1 / d))
     height = f"0 {edge!r}" if d == 3 else "-0.5 0.5"
     place = rng.uniform(0, edge, (count, 3)) * ([1, 1, 1] if d == 3 else [1, 1, 0])
-    lmp.commands_string(f"""
-units si
-dimension {d}
-atom_style sphere
-boundary p p p
-newton off
-comm_modify vel yes
-region box prism 0 {edge!r} 0 {edge!r} {height} 0 0 0
-create_box 1 box
-""")
+    deck, flat = (Path(__file__).parent / "periodic_box.in").read_text(), "fix flat all enforce2d" if d == 2 else ""
+    box, motion = deck.format(d=d, edge=edge, height=height, flat=flat).split("# particles are created here\n")
+    lmp.commands_string(box)
     lmp.create_atoms(count, list(range(1, count + 1)), [1] * count, place.ravel().tolist())
     for number, each in enumerate(radius.tolist(), 1):
         lmp.command(f"set atom {number} diameter {2 * each!r} density 1.0")
-    # without friction no dashpot acts along the slip, as LAMMPS would store its force as a slip
-    lmp.commands_string(f"""
-pair_style gran/hertz/history 1000.0 1e-12 100.0 0.0 0.0 1
-pair_coeff * *
-neighbor 0.3 bin
-{"fix flat all enforce2d" if d == 2 else ""}
-fix move all nve/sphere
-fix drag all viscous 0.5
-timestep 0.002
-thermo_style custom step pxx pyy pzz pxy pxz pyz
-thermo 1000000
-run 30000
-pair_style gran/hertz/history 1000.0 800.0 100.0 100.0 0.5 1
-pair_coeff * *
-fix box all deform 1 xy erate 0.0005 remap v flip no
-run 20000
-unfix box
-""")
+    lmp.commands_string(motion)
     for _ in range(40):
         lmp.command("run 20000")
         found = from_lammps(lmp, balance=np.inf, prove=False)

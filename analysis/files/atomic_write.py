@@ -1,17 +1,15 @@
 """Files that are complete at any moment, and in which damage is detected.
 
-A file is written under another name and renamed, so that a reader, a kill or a full disk never leaves half a file. The
-other name is unpredictable, and belongs to a file that does not exist yet: a link prepared under this name is not
-followed.
-
-No file is replaced that this program has not written. It knows its own files by a mark, which is also the number of
-the format: ``faultgouge_format=1`` in a comment or another place that readers of the format skip, the key
-``faultgouge_format`` of JSON, and of HDF5 the seal. A table in CSV has no place for a mark: its first line tells.
+A file is written under another name, of a file that does not exist yet, and renamed, so that a reader, a kill or a full
+disk never leaves half a file. No file is replaced that this program has not written. It knows its own files by a mark,
+which is also the number of the format: ``faultgouge_format=1`` in a comment or another place that readers of the format
+skip, the key ``faultgouge_format`` of JSON, and of HDF5 the seal. A table in CSV has no place for a mark: its first
+line tells.
 
 A *sealed* file of HDF5 begins with a text header of 512 bytes: a description of the file, the SHA-256 of all following
 bytes, and its length. A single flipped byte is then detected. HDF5 looks for its superblock at the bytes 0, 512, 1024,
-... (the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file. The checksum
-says that the content is what was written. It does not cover other files to which HDF5 may link: these are refused.
+... (the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file. Other files
+to which HDF5 may link are not covered by the checksum: these are refused.
 
 Files that users name for reading must be plain: a pipe or a device may never end, and cannot be read twice.
 """
@@ -79,10 +77,7 @@ def telling(path: object, says: str, errors: type[Exception] = Exception) -> Ite
 
 
 def open_plain(path: str | PathLike[str]) -> BinaryIO:
-    """A plain file, opened for reading its bytes.
-
-    Raises OSError if the file cannot be read, or is a folder, a pipe, a socket or a device.
-    """
+    """A plain file, opened for reading its bytes; an OSError of a folder, a pipe, a socket or a device."""
     if Path(path).exists() and not Path(path).is_file():
         raise OSError(errno.EINVAL, "it is a folder, a pipe or a device, and no plain file", str(path))
     return open(path, "rb")
@@ -95,10 +90,8 @@ def begins_with(path: Path, *beginnings: bytes) -> bool:
 
 
 def open_text(path: str | PathLike[str]) -> TextIO:
-    """The text of a plain file in UTF-8, for reading; decompressed if its first bytes are those of gzip.
-
-    Raises OSError as `open_plain` does. Who reads a damaged text meets an EOFError, a zlib.error or an OSError.
-    """
+    """The text of a plain file in UTF-8, decompressed if it begins like gzip; if damaged, reading raises an EOFError, a
+    zlib.error or an OSError."""
     stream = open_plain(path)
     compressed = stream.read(2) == b"\x1f\x8b"  # LAMMPS compresses a dump whose name ends in .gz
     stream.seek(0)
@@ -158,10 +151,8 @@ def _synchronise(path: Path) -> None:
 
 
 def check_own(path: Path, head: str = "") -> None:
-    """Refuse to replace or to remove a file that is read-only, or that this program has not written.
-
-    Raises an OutputError, of a folder, a pipe or a device, too. `head` is how files of a format without a mark begin;
-    an empty file is anybody's.
+    """Refuse, by an OutputError, to replace or to remove a file that is read-only, or not written by this program, or a
+    folder, a pipe or a device. `head` is how files of a format without a mark begin; an empty file is anybody's.
     """
     if not path.exists():
         return
@@ -228,30 +219,25 @@ def make_folder(path: Path, *names: str) -> None:
 
 @contextmanager
 def lock_output(path: Path) -> Iterator[None]:
-    """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
-
-    The lock is a file beside the file, or in the folder, and is removed in the end. Raises OutputError if another
-    process has it.
-    """
+    """Keep other processes from writing a file, or into a folder, by a lock beside it, or in it, which goes with this
+    process. Raises OutputError if another has it."""
     lock = lock_of(path)
     try:
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        stream = lock.open("ab")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
-    held = False
-    try:
+    with stream:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            held = os.path.samestat(os.fstat(descriptor), lock.stat())  # or who had it before has just removed it
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held = os.path.samestat(os.fstat(stream.fileno()), lock.stat())  # or who had it before has just removed it
         except OSError as error:  # another has it, or there are no locks on this file system
             held = not isinstance(error, BlockingIOError | FileNotFoundError)
         if not held:
             raise OutputError(f"{path} cannot be written, since another run is writing it: give another name, or wait.")
-        yield
-    finally:
-        if held:
+        try:
+            yield
+        finally:
             lock.unlink(missing_ok=True)
-        os.close(descriptor)
 
 
 def lock_of(path: Path) -> Path:
@@ -281,10 +267,8 @@ def _header(image: bytes) -> bytes:
 
 
 def open_sealed(path: Path, writable: bool = False) -> h5py.File:
-    """Open a file that has been checked whole; its content is in memory.
-
-    Raises PackingFileError if the file is missing, damaged, of a later format, or has numbers that are not in it.
-    """
+    """Open a file that has been checked whole; its content is in memory. A PackingFileError if the file is missing,
+    damaged, of a later format, or has numbers that are not in it."""
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     import h5py

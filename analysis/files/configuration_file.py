@@ -11,9 +11,9 @@ The file is sealed like every run.h5 (:mod:`.atomic_write`), and is H5MD 1.1::
 """
 
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -25,31 +25,17 @@ from .atomic_write import SEAL, begins_with, new_sealed, open_sealed, telling, w
 if TYPE_CHECKING:
     import h5py
 
-CREATOR = "faultgouge"
-
-CHECKSUM: dict[str, Any] = {"fletcher32": True}
-"""A checksum for every chunk, for readers other than this one."""
-
-PARTS = {"contacts": tuple(PER_CONTACT)} | dict.fromkeys(
-    ("stiffness", "damping", "constraint"), ("data", "indices", "indptr")
-)
+SPARSE = "data", "indices", "indptr"
+PARTS = {"contacts": tuple(PER_CONTACT), "stiffness": SPARSE, "damping": SPARSE, "constraint": SPARSE}
 """Fields of a Configuration that are groups, and the arrays in each."""
 
 
 def write_configuration(
     path: Path, configuration: Configuration, attributes: Mapping[str, str | int | float] | None = None
 ) -> None:
-    """Write a configuration; an existing file is replaced.
+    """Write a configuration, with attributes of the root, such as the deck; an existing file is replaced.
 
-    Parameters
-    ----------
-    attributes : mapping, optional
-        Attributes of the root, such as the deck.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    Raises OutputError if the file cannot be written.
     """
     c = configuration
     with new_sealed() as file:
@@ -61,16 +47,14 @@ def write_configuration(
         particles["box/edges"] = np.linalg.norm(c.box, axis=1)
         sides = ["periodic" if each else "none" for each in c.periodic]
         particles["box"].attrs.update({"dimension": 3, "boundary": sides})
-        given = {name: value for name in c.__dataclass_fields__ if (value := getattr(c, name)) is not None}
-        for name, value in given.items():
+        for name in c.__dataclass_fields__:
+            value = getattr(c, name)
             if isinstance(value, np.ndarray):
                 group[name] = value
-            elif name not in PARTS and value != ():
+            elif value is not None and name in PARTS:
+                group.update({f"{name}/{part}": getattr(value, part) for part in PARTS[name]})
+            elif value is not None and value != ():
                 group.attrs[name] = value
-            for part in PARTS.get(name, ()):
-                values = getattr(value, part)
-                layout = {"chunks": True, **CHECKSUM} if len(values) else {}
-                group.create_dataset(f"{name}/{part}", data=values, **layout)
         file.attrs.update(attributes or {})
         write_sealed(path, file)
 
@@ -97,20 +81,14 @@ def read_configuration(path: Path) -> Configuration:
                 given[name] = group[name][()]
                 continue
             parts = {part: group[name][part][()] for part in PARTS[name] if part in group[name]}
-            if name == "contacts":
-                given[name] = LinearisedContacts(**parts)
-            else:
-                given[name] = csr_array(tuple(parts.values()), shape=(len(parts["indptr"]) - 1,) * 2)
-                given[name].check_format()
+            sparse = name != "contacts"
+            rows = len(parts["indptr"]) - 1 if sparse else 0
+            given[name] = csr_array((*parts.values(),), (rows, rows)) if sparse else LinearisedContacts(**parts)
         return Configuration(**given)
 
 
 def write_h5md(file: "h5py.File") -> None:
-    """The version of H5MD, and what has written the file; no version where it is not installed."""
-    try:
-        program = version(CREATOR)
-    except PackageNotFoundError:
-        program = ""
+    """The version of H5MD, and what has written the file."""
     file.create_group("h5md").attrs["version"] = np.array([1, 1])
-    file.create_group("h5md/author").attrs["name"] = CREATOR
-    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})
+    file.create_group("h5md/author").attrs["name"] = "faultgouge"
+    file.create_group("h5md/creator").attrs.update({"name": "faultgouge", "version": version("faultgouge")})

@@ -20,11 +20,9 @@ Columns of a dump local have no names but c_1[1] ...: `--columns` gives theirs, 
 Which of two opposite signs a table has is read off the balance of forces. Where the other sign balances the forces
 better it is taken, and a remark says so.
 
-**What six digits can tell.** Forces are taken from the table, overlaps and stiffnesses from the forces, directions from
-the places: with six digits of places a residual of 1e-5 of the forces is left, which a load balances. Friction mu f_n
-and |f_t| have errors of 5e-6 each, so that a contact within 1.5e-5 of Coulomb's bound is taken as one at the bound.
-`verdict_within_digits` gives the verdict that all of some draws within the rounding share, or says that the digits do
-not tell.
+Forces are taken from the table, overlaps and stiffnesses from the forces, directions from the places: with six digits
+of places a residual of 1e-5 of the forces is left, which a load balances. Friction mu f_n and |f_t| have errors of 5e-6
+each, so that a contact within 1.5e-5 of Coulomb's bound is taken as one at the bound.
 """
 
 from __future__ import annotations
@@ -43,7 +41,7 @@ from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
 from .atomic_write import telling
-from .formats.disks import Disks, choose_frame
+from .formats.disks import Disks, choose_frame, places_of
 from .formats.tables import columns_of, contact_columns, lines_of, number_of, strip_comments
 
 HALF_A_DIGIT = 5e-6
@@ -71,21 +69,17 @@ def material_of(text: str) -> Material:
     """A material of key=value,...; a BadInputError names the word that is wrong."""
     given: dict[str, float] = {}
     for word in text.split(","):
-        key, _, value = word.partition("=")
-        if key.strip() not in Material._fields or not value:
+        key, _, value = map(str.strip, word.partition("="))
+        if key not in Material._fields or not value:
             raise BadInputError(f"--material {word.strip()!r}: give {', '.join(Material._fields)}, as in young=7e10")
-        given[key.strip()] = number_of(value, f"--material {key.strip()}")
+        given[key] = number_of(value, f"--material {key}")
     return Material(**given).checked()
 
 
 def of_material(spheres: Disks, material: Material, **more: Any) -> Configuration:
     """Spheres with Hertz's contacts, or springs; in a sentence of their table where they form no packing."""
-    options: dict[str, Any] = {
-        "box": spheres.box,
-        "origin": spheres.origin,
-        "periodic": spheres.periodic or [False] * 3,
-    }
-    options |= {"mass": spheres.mass if material.density is None else None} | more
+    sides, mass = spheres.periodic or [False] * 3, spheres.mass if material.density is None else None
+    options: dict[str, Any] = {"box": spheres.box, "origin": spheres.origin, "periodic": sides, "mass": mass} | more
     with telling(spheres.source, "describes no possible packing", ValueError):
         return spheres_of_material(spheres.position, spheres.radius, material, **options)
 
@@ -94,8 +88,8 @@ def _fstat(path: Path, frame: int) -> dict[str, Floats]:
     """The contacts of MercuryDPM at one time, whose lines follow a line "# time ...", and two more comments."""
     lines = lines_of(path)
     starts = [k for k, line in enumerate(lines) if re.match(r"#\s+\d", line)]
-    begin = starts[choose_frame(path, [0] * len(starts), frame)]
-    end = next((k for k in starts if k > begin), len(lines))
+    chosen = choose_frame(path, len(starts), frame)
+    begin, end = [*starts, len(lines)][chosen : chosen + 2]
     table = columns_of(path, strip_comments(lines[begin:end], begin + 1), FSTAT, f"{len(FSTAT)} are needed")
     return table | {f"ft{axis}": table["ft"] * table[f"t{axis}"] for axis in "xyz"}
 
@@ -105,30 +99,20 @@ def read_contacts(
 ) -> Configuration:
     """The packing of spheres and a table of contacts with forces, under a load that balances what the digits leave.
 
-    Raises
-    ------
-    PackingFileError
-        If a column is missing, a contact names a sphere that is not there or two that do not touch, or forces are out
-        of balance.
+    A PackingFileError if a column is missing, a contact names a sphere that is not there or two that do not touch, or
+    forces are out of balance.
     """
-    if path.suffix == ".fstat":
-        table = _fstat(path, frame)
-    else:
-        table = contact_columns(path, "id1", "id2", frame=frame, names=columns)
+    of_mercury = path.suffix == ".fstat"
+    table = _fstat(path, frame) if of_mercury else contact_columns(path, "id1", "id2", frame=frame, names=columns)
     # neighbours that do not touch have rows of zeros in pair/local
-    given = [table[name] != 0 for name in FORCES if name in table]
-    bears = np.any(given, axis=0) if given else np.ones(len(table["id1"]), bool)
-    table = {name: column[bears] for name, column in table.items()}
+    forces = [table[name] for name in FORCES if name in table]
+    table = {name: column[np.any(forces, axis=0)] if forces else column for name, column in table.items()}
     ids = np.array([table["id1"], table["id2"]])
-    wall = (ids < 0) | ((ids == 0) & (0 not in spheres.id))
-    wall[0] = False
-    ends = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
-    for strange in ids[~wall & (spheres.id[ends] != ids)]:
-        raise PackingFileError(f"{path}: a contact names sphere {strange:g}, which is not in {spheres.source}.")
-    ends[wall] = WALL
-    (i, j), wall = ends, wall[1]
-    for itself in ids[0][i == j]:
+    wall = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
+    i, j = places_of(ids, spheres.id, path, np.array([np.zeros_like(wall), wall]))
+    for itself in ids[0][ids[0] == ids[1]]:
         raise PackingFileError(f"{path}: sphere {itself:g} touches itself.")
+    j[wall] = WALL
 
     # vectors from the second to the first, through the sides of the box where they do not touch otherwise
     place = np.pad(spheres.position, ((0, 0), (0, 3 - spheres.position.shape[1])))
@@ -138,20 +122,17 @@ def read_contacts(
             raise PackingFileError(f"{path} has contacts with walls, and no px, py, pz: where each wall is touched.")
         # a point in the middle of the overlap is on the line through the centre, whatever wall it is
         branch[wall] = (place[i] - np.column_stack([table[f"p{axis}"] for axis in "xyz"]))[wall]
-    apart = np.linalg.norm(branch, axis=1) > TOUCHING * reach
-    periodic = np.array([False] * 3 if spheres.periodic is None else spheres.periodic)
+    apart, told, images = np.linalg.norm(branch, axis=1) > TOUCHING * reach, spheres.periodic is not None, 0 * branch
+    may = np.array(spheres.periodic if told else [True] * 3)
     if apart.any() and spheres.box is not None:
-        # where the file does not say which sides are periodic: those that a contact needs
-        may = periodic | (spheres.periodic is None)
-        images = np.where(may, np.round(branch @ np.linalg.inv(spheres.box)), 0.0) * apart[:, None]
+        images = np.where(may & apart[:, None], np.round(branch @ np.linalg.inv(spheres.box)), 0.0)
         branch = branch - images @ spheres.box
-        periodic = images.any(axis=0) if spheres.periodic is None else periodic
+    periodic = may if told else images.any(axis=0)  # where the file does not say: the sides that a contact needs
     gap = np.linalg.norm(branch, axis=1) - reach
     for k in np.flatnonzero(gap > (TOUCHING - 1) * reach):
         says = f"spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are {gap[k]:.3g} apart"
         raise PackingFileError(f"{path}: {says}: give the places of the same moment, and the box.")
-    n = branch / np.linalg.norm(branch, axis=1)[:, None]
-    fn, ft = _forces(path, table, n)
+    fn, ft = _forces(path, table, branch / np.linalg.norm(branch, axis=1)[:, None])
 
     # each contact once, though .fstat may have it from both sides
     image = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
@@ -159,10 +140,8 @@ def read_contacts(
     i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
     size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
     for k in np.flatnonzero(size > (1 + AT_REST) * bound):
-        says = (
-            f"|f_t| of {spheres.id[i[k]]} is {size[k] / max(fn[k], 1e-300):.4g} f_n, beyond the coefficient of friction"
-        )
-        raise PackingFileError(f"{path}: {says} {material.friction:g}: give --material friction=.")
+        says = f"|f_t| of {spheres.id[i[k]]} is {size[k] / max(fn[k], 1e-300):.4g} f_n, beyond the coefficient of"
+        raise PackingFileError(f"{path}: {says} friction {material.friction:g}: give --material friction=.")
     # what the digits do not tell from the bound is at the bound
     ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
 
@@ -181,12 +160,10 @@ def read_contacts(
 
 def _forces(path: Path, table: dict[str, Floats], n: Floats) -> tuple[Floats, Floats]:
     """f_n and f_t on the first partner."""
-
-    def vectors(name: str) -> Floats | None:
-        parts = [table.get(f"{name}{axis}", np.zeros(len(n))) for axis in "xyz"]
-        return np.column_stack(parts) if {f"{name}x", f"{name}y"} <= table.keys() else None
-
-    whole, elastic, shear, tangential = (vectors(name) for name in ("f", "fn", "fs", "ft"))
+    whole, elastic, shear, tangential = (
+        np.column_stack([table[f"{name}x"], table[f"{name}y"], table.get(f"{name}z", np.zeros(len(n)))])
+        if {f"{name}x", f"{name}y"} <= table.keys() else None for name in ("f", "fn", "fs", "ft")
+    )  # fmt: skip
     if elastic is not None and shear is not None:  # YADE, on the second
         whole = -(elastic + shear)
     if whole is not None and "fn" not in table:
@@ -209,22 +186,14 @@ def _out_of_balance(c: Configuration) -> float:
 
 
 def verdict_within_digits(found: Configuration) -> tuple[Stability, str]:
-    """The verdict of a packing of a table, and what its digits tell of it.
-
-    Returns
-    -------
-    verdict : Stability
-        Of the numbers as they are.
-    says : str
-        Whether all draws of forces and stiffnesses within the rounding of six digits have the same verdict.
-    """
+    """The verdict of a packing of a table as it is, and whether all draws of forces and stiffnesses within the rounding
+    of six digits have the same."""
     verdicts, c, rng = [stability(found)], found.contacts, np.random.default_rng(0)
     for _ in range(ROUNDED_TABLES):
         error = 1 + HALF_A_DIGIT * rng.uniform(-1, 1, (2, len(c)))
-        turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * rng.uniform(-1, 1, (len(c), 3))
+        across = rng.uniform(-1, 1, (len(c), 3)) * (np.arange(3) < found.dimension)
+        turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * across
         turned -= np.einsum("ca,ca->c", turned, c.normal)[:, None] * c.normal
-        if found.dimension == 2:
-            turned[:, 2] = 0.0
         size, most = np.linalg.norm(turned, axis=1), c.friction * error[0]
         held = np.where(c.at_bound | (size > most), most / np.maximum(size, np.finfo(float).tiny), 1.0)
         drawn = derive_frozen(

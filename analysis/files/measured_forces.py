@@ -12,11 +12,10 @@ contacts   ``step, id1, id2, f_t, f_n``; f_t along n turned by 90 degrees; walls
 J. E. Kollmer, K. E. Daniels, J. M. Schwarz and S. Henkes, Phys. Rev. Lett. 126, 088002, 2021.) The sign of all f_t that
 balances the forces better is taken.
 
-**What they tell.** Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come
-from the small asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions
-without stiffness, and in how many draws of the forces from their errors the linearised packing is unstable. A load on
-each disk balances each such packing, and no motion of a real packing or of LAMMPS's is beside these verdicts. The error
-of f_n is read off the two sides of the contacts. A table whose sides are equal, or that has one, does not tell it.
+Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come from the small
+asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions without
+stiffness, and in how many draws of the forces from their errors the linearised packing, balanced by a load on each
+disk, is unstable. The error of f_n is read off the two sides of the contacts; equal sides, or one, do not tell it.
 """
 
 from __future__ import annotations
@@ -65,30 +64,17 @@ def _rows(path: Path, *widths: int) -> Floats:
 def measured_forces(
     particles: Path, contacts: Path, material: Material, frame: int = -1
 ) -> tuple[Configuration, list[str]]:
-    """A packing with measured contact forces, and what can be said of it.
+    """A packing with measured contact forces, as one whose stability is not known, and what can be said of it.
 
-    Parameters
-    ----------
-    frame : int
-        Which of the steps of the table of contacts, in their order.
-
-    Returns
-    -------
-    configuration : Configuration
-        Disks with the forces as they are, as one whose stability is not known.
-    says : list of str
-        Counts, rigidity, the chance of "unstable", and why there is no rate.
-
-    Raises
-    ------
-    PackingFileError
-        If a table is none of RigidLibrary's, or a contact names a disk that is not there.
+    That are counts, rigidity, the chance of "unstable", and why there is no rate. `frame` is which of the steps of the
+    table of contacts, in their order. A PackingFileError if a table is none of RigidLibrary's, or a contact names a
+    disk that is not there.
     """
     disks, rows = _rows(particles, 5, 6), _rows(contacts, 5)
     steps = np.unique(rows[:, 0])
-    step = steps[choose_frame(contacts, [0] * len(steps), frame)]
+    step = steps[choose_frame(contacts, len(steps), frame)]
     disks = disks[disks[:, 0] == step][:, 1:] if disks.shape[1] == 6 else disks
-    rows, ids = rows[rows[:, 0] == step], disks[:, 0]
+    rows, ids, centre, radius = rows[rows[:, 0] == step], disks[:, 0], disks[:, 1:3], disks[:, 3]
     walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
     rows = rows[~walls]
     for strange in np.setdiff1d(rows[:, 1:3], ids):
@@ -100,9 +86,7 @@ def measured_forces(
     ft, fn = (np.bincount(place, rows[:, k], len(pairs)) / count for k in (3, 4))
     differ = np.abs(rows[:, 4] - fn[place]) / np.maximum(fn[place], np.finfo(float).tiny)
     twice = differ[(count[place] > 1) & (differ > 0)]
-    error = 2 * float(np.median(twice)) if len(twice) else None
     (i, j), fn, ft = pairs[fn > 0].T, fn[fn > 0], ft[fn > 0]
-    centre, radius = disks[:, 1:3], disks[:, 3]
     branch = np.pad(centre[i] - centre[j], ((0, 0), (0, 1)))
     along = np.cross([0.0, 0.0, 1.0], branch / np.linalg.norm(branch, axis=1)[:, None])
     mass = np.pi * radius**2 * (material.density or 1.0)
@@ -117,23 +101,21 @@ def measured_forces(
 
     touches, own = (np.bincount(np.append(i, j), each, len(radius)) for each in (None, np.append(fn, fn)))
     inside = touches > 2  # fewer are rattlers, or held by a wall that the files do not have
-
-    def imbalance(found: Configuration) -> Floats:
-        return np.asarray(np.linalg.norm(found.contact_force[:, 0], axis=1)[inside] * touches[inside] / own[inside])
-
     found, other = packing(fn, ft), packing(fn, -ft)
-    if inside.any() and imbalance(other).mean() < imbalance(found).mean():
-        found, ft = other, -ft
+    forces = (np.linalg.norm(each.contact_force[inside, 0], axis=1) for each in (found, other))
+    lacks, flipped = (force * touches[inside] / own[inside] for force in forces)
+    if flipped.sum() < lacks.sum():
+        found, ft, lacks = other, -ft, flipped
     chance = "the table has one f_n for a contact, not one from either side: its error, and a chance, are not known"
-    if error is not None:
-        rng, seen = np.random.default_rng(0), []
+    if len(twice):
+        error, rng, seen = 2 * float(np.median(twice)), np.random.default_rng(0), list[bool | None]()
         for _ in range(DRAWN_FORCES):
             drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
             seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
-        unknown = f", and {seen.count(None)} not known" if None in seen else ""
-        chance = f"unstable in {seen.count(False)} of {DRAWN_FORCES} draws of the forces within an error of f_n of "
-        chance += f"{error:.2g}{unknown}, if a load on each disk balanced the forces drawn"
-    left_out = f"; {counted(int(walls.sum()), 'row')} of walls left out, whose place no file has" if walls.any() else ""
+        words = f"unstable in {seen.count(False)} and not known in {seen.count(None)} of {DRAWN_FORCES} draws of the"
+        chance = (
+            f"{words} forces within an error of f_n of {error:.2g}, if a load on each disk balanced the forces drawn"
+        )
     # motions of the disks in contact that stretch no spring, without translations and rotation as a whole
     c, none = found.contacts, np.zeros_like(found.contacts.normal)
     sticking = np.where(c.at_bound, 0.0, c.tangential_stiffness)
@@ -143,11 +125,11 @@ def measured_forces(
     moves = active_coordinates(matrix)
     values = eigvalsh(matrix[moves][:, moves].toarray())
     floppy = 3 * np.count_nonzero(touches) - 3 - int(np.sum(values > FREE_OF_SPRINGS * values[-1]))
-    lacks = np.median(imbalance(found)) if inside.any() else 0.0
-    disks_of = counted(len(np.unique(pairs)), "disk")
+    at_bound, most = int(c.at_bound.sum()), np.median(lacks) if len(lacks) else 0.0
     says = [
-        f"{counted(len(fn), 'contact')} of {disks_of}, {int(c.at_bound.sum())} at Coulomb's bound; forces on a disk "
-        f"are out of balance by {lacks:.2g} of its mean contact force (median){left_out}",
+        f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {at_bound} at Coulomb's bound; "
+        f"forces on a disk are out of balance by {most:.2g} of its mean contact force (median); "
+        f"{counted(int(walls.sum()), 'row')} of walls left out, whose place no file has",
         f"{floppy} motions without stiffness beside those of a free body, if contacts at the bound slide",
         chance,
         NO_RATE,

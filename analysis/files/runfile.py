@@ -30,8 +30,10 @@ Datasets depend on the scene alone; scene, versions, seed and ranks are attribut
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import MISSING, fields
 from os import PathLike
 from pathlib import Path
 from time import monotonic
@@ -46,7 +48,7 @@ from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
 from .atomic_write import new_sealed, open_sealed, telling, write_sealed
-from .configuration_file import CHECKSUM, write_h5md
+from .configuration_file import write_h5md
 
 if TYPE_CHECKING:
     import h5py
@@ -57,12 +59,12 @@ NONE_GIVEN = "none were given"
 SHARE_OF_SAVING = 0.05
 """Share of the time that saving takes, at the most: a frame or a part of a series waits that long to be saved."""
 
+CHECKSUM: dict[str, Any] = {"fletcher32": True}
+"""A checksum for every chunk, for readers other than this one."""
+
 COMPACT: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
-
-NEEDED_BY_LAW = "kn", "kt", "mu"
-"""Parameters of the law that a file must have; the others have defaults."""
 
 POSITION, EDGES = "particles/disks/position", "particles/disks/box/edges"
 
@@ -80,13 +82,10 @@ class RunFile(AbstractContextManager["RunFile"]):
         self.path, self._writable = Path(path), mode == "a"
         self.saved, self._sound, self._next_save = True, True, 0.0
         self._file = open_sealed(self.path, self._writable)
-        if "snapshot" in self._file:
-            self._file.close()
-            raise PackingFileError(
-                f"{self.path} holds a packing as LAMMPS left it, and no run of ours: spectrum, draw take it."
-            )
-        with telling(self.path, "holds no run"):
-            self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
+        if "parameters" not in self._file:
+            says = "holds no run of ours: of a packing as LAMMPS left it, spectrum and draw tell"
+            raise PackingFileError(f"{self.path} {says}.")
+        self._parameters = {name: item[()] for name, item in self._file["parameters"].items()}
 
     @classmethod
     def create(
@@ -94,28 +93,18 @@ class RunFile(AbstractContextManager["RunFile"]):
     ) -> RunFile:
         """Start a new file for runs of the disks of a packing; an existing file is replaced.
 
-        Parameters
-        ----------
-        packing : Packing
-            Its radii, masses, upper layer, law, inertia factor and box are those of every frame. It is not
-            appended.
-        attributes : mapping, optional
-            Attributes of the root: the resolved scene as JSON, versions, seed, ranks.
-
-        Returns
-        -------
-        RunFile
-            Open for appending, without frames, and not `complete`. Raises OutputError if it cannot be written.
+        Radii, masses, upper layer, law, inertia factor and box of the packing are those of every frame; it is not
+        appended. `attributes` are those of the root: the resolved scene as JSON, versions, seed, ranks. The file is
+        open for appending, without frames, and not `complete`. Raises OutputError if it cannot be written.
         """
         with new_sealed() as file:
             write_h5md(file)
-            disks, shape = file.create_group("particles/disks"), (len(packing), 3)
+            disks = file.create_group("particles/disks")
             sides = ["none" if packing.box_length is None else "periodic", "none", "none"]
             disks.create_group("box").attrs.update({"dimension": 3, "boundary": np.array(sides, "S8")})
-            position = disks.create_group("position")
-            for clock, kind in (("step", np.int64), ("time", np.float64)):
-                position.create_dataset(clock, (0,), kind, maxshape=(None,), **CHECKSUM)
-            position.create_dataset("value", (0, *shape), float, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
+            position, clocks = disks.create_group("position"), {"step": np.zeros(0, np.int64), "time": np.zeros(0)}
+            for name, rows in {**clocks, "value": np.zeros((0, len(packing), 3))}.items():
+                _write_rows(position, name, rows, 0)
             # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room
             file["observables/position"] = position
             for name, value in parameters_of(packing).items():
@@ -209,15 +198,8 @@ class RunFile(AbstractContextManager["RunFile"]):
     def append(self, packing: Packing, **scalars: float) -> None:
         """Add an equilibrium; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
 
-        Parameters
-        ----------
-        **scalars : float or int
-            Further observables, such as the number of evaluations: the same names in every frame.
-
-        Raises
-        ------
-        ValueError
-            If disks, law or box are not those of the file, or the names differ from those of earlier frames.
+        `scalars` are further observables, such as the number of evaluations. Raises ValueError if disks, law or box are
+        not those of the file, or names of observables are not those of earlier frames.
         """
         known, own, count, c = self._parameters, parameters_of(packing), len(self), packing.contacts
         for name in known | own:
@@ -240,19 +222,11 @@ class RunFile(AbstractContextManager["RunFile"]):
         with self.change():
             for name, value in parts.items():
                 if name not in self._file:
-                    self._begin(name, value)
-                _extend(self._file[name]["value"], value[None], count)
+                    clocks = {clock: self._file[f"{POSITION}/{clock}"] for clock in ("step", "time")}
+                    self._file.create_group(name).update(clocks)
+                _write_rows(self._file[name], "value", value[None], count)
             for clock in ("time", "step"):
-                _extend(self._file[f"{POSITION}/{clock}"], np.array([count]), count)
-
-    def _begin(self, name: str, value: NDArray) -> None:
-        """Make an element of H5MD for values such as one of a frame; contacts may become more."""
-        group, whole = self._file.create_group(name), np.issubdtype(value.dtype, np.integer)
-        layout = dict(COMPACT if value.ndim else CHECKSUM) | {"chunks": (1, *value.shape) if value.size > 1 else True}
-        layout |= {"fillvalue": 0 if whole else np.nan, "maxshape": (None,) * (value.ndim + 1)}
-        group.create_dataset("value", (0, *value.shape), np.int64 if whole else float, **layout)
-        for clock in ("step", "time"):
-            group[clock] = self._file[f"{POSITION}/{clock}"]
+                _write_rows(self._file[POSITION], clock, np.array([count]), count)
 
     @property
     def _rows_of_frames(self) -> dict[str, h5py.Dataset]:
@@ -275,10 +249,9 @@ class RunFile(AbstractContextManager["RunFile"]):
         count, given = len(self), self._parameters
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
-        seen = {name: self.observable(name)[frame % count] for name in ("contacts", "angle", "fx", "fy")}
-        if "position_low" in self.observables:
-            seen["position_low"] = self.observable("position_low")[frame % count]
-        rows = seen.pop("contacts")
+        stored = [name for name in ("angle", "fx", "fy", "position_low") if name in self.observables]
+        seen = {name: self.observable(name)[frame % count] for name in stored}
+        rows = self.observable("contacts")[frame % count]
         known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
         names = ("radius", "mass", "inertia_factor", "box_length", "drag_time", "spring")
         with telling(self.path, "is damaged", ValueError):  # numbers that no packing has
@@ -293,19 +266,14 @@ class RunFile(AbstractContextManager["RunFile"]):
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
         """Add frames of the undamped run that began at the last equilibrium.
 
-        Parameters
-        ----------
-        time : array_like, shape (S,)
-            Since the beginning of the run.
-        position, position_low : array_like, shape (S, N, 2)
-            Centres, length, and their low parts if there are any.
+        `time`, shape (S,), counts from the beginning of the run; `position` and `position_low`, shape (S, N, 2), are
+        centres, length, and their low parts if there are any.
         """
-        begin, place = len(self._file[f"{POSITION}/step"]), np.pad(position, ((0, 0), (0, 0), (0, 1)))
+        begin, low = len(self._file[f"{POSITION}/step"]), {} if position_low is None else {"position_low": position_low}
+        place = np.pad(position, ((0, 0), (0, 0), (0, 1)))
         new = {"value": place, "time": time, "step": np.arange(begin, begin + len(place))}
         with self.change():
-            self.append_series(
-                "trajectory", time=time, **({} if position_low is None else {"position_low": position_low})
-            )
+            self.append_series("trajectory", time=time, **low)
             for name, data in self._rows_of_frames.items():
                 data.resize(begin + len(place), axis=0)
                 if name.startswith(POSITION):
@@ -316,10 +284,8 @@ class RunFile(AbstractContextManager["RunFile"]):
     def append_series(self, name: str, **columns: ArrayLike) -> None:
         """Add rows to a time series, which begins with the first call.
 
-        Parameters
-        ----------
-        **columns : array_like, shape (R, ...)
-            Columns by name, all of the same length; each call must give the same names, or a ValueError says so.
+        `columns`, each of shape (R, ...), have the same length, and the same names in each call, or a ValueError says
+        so.
         """
         group = self._file.require_group(f"faultgouge/{name}")
         arrays = {column: np.atleast_1d(value) for column, value in columns.items()}
@@ -328,10 +294,7 @@ class RunFile(AbstractContextManager["RunFile"]):
         start = _rows(group)
         with self.change():
             for column, array in arrays.items():
-                if column not in group:
-                    layout: dict[str, Any] = {"maxshape": (None, *array.shape[1:]), "chunks": True, **CHECKSUM}
-                    group.create_dataset(column, (0, *array.shape[1:]), array.dtype, **layout)
-                _extend(group[column], array, start)
+                _write_rows(group, column, array, start, series=True)
 
     @property
     def names_of_series(self) -> tuple[str, ...]:
@@ -349,11 +312,18 @@ class RunFile(AbstractContextManager["RunFile"]):
         return columns
 
 
-def _extend(data: h5py.Dataset, rows: NDArray, start: int) -> None:
-    """Write rows from a number on, in place of what is there; further axes grow as they must."""
-    size = [max(have, need) for have, need in zip(data.shape[1:], rows.shape[1:], strict=True)]
+def _write_rows(group: h5py.Group, name: str, rows: NDArray, start: int, series: bool = False) -> None:
+    """Write rows of frames, or of a time series, from a number on, in place of what is there; the dataset is made with
+    the first. Further axes grow as they must, as contacts may become more."""
+    shape, empty = rows.shape[1:], np.nan if rows.dtype.kind == "f" else 0
+    if name not in group:
+        chunks = True if series or math.prod(shape) <= 1 else (1, *shape)
+        layout = {"maxshape": (None,) * rows.ndim, "chunks": chunks, "fillvalue": empty}
+        group.create_dataset(name, (0, *shape), rows.dtype, **layout, **(CHECKSUM if series or not shape else COMPACT))
+    data = group[name]
+    size = [max(have, need) for have, need in zip(data.shape[1:], shape, strict=True)]
     data.resize((start + len(rows), *size))
-    filled = np.full((len(rows), *size), data.fillvalue, data.dtype)
+    filled = np.full((len(rows), *size), empty, data.dtype)
     filled[tuple(map(slice, rows.shape))] = rows
     data[start:] = filled
 
@@ -365,17 +335,14 @@ def _rows(group: h5py.Group) -> int:
 
 def law_parameters(law: MindlinLaw) -> dict[str, float]:
     """kn, kt, mu, and the parameters of the law that differ from their defaults."""
-    usual = MindlinLaw(law.kn, law.kt, law.mu)
-    given = {name: getattr(law, name) for name in MindlinLaw.__dataclass_fields__}
-    return {
-        name: float(value) for name, value in given.items() if name in NEEDED_BY_LAW or value != getattr(usual, name)
-    }
+    given = {each.name: (getattr(law, each.name), each.default) for each in fields(law)}
+    return {name: float(value) for name, (value, default) in given.items() if value != default}
 
 
 def law_of_parameters(given: Mapping[str, Any]) -> MindlinLaw:
     """The reverse of `law_parameters`; a KeyError if kn, kt or mu is missing."""
-    names = [name for name in MindlinLaw.__dataclass_fields__ if name in given or name in NEEDED_BY_LAW]
-    return MindlinLaw(**{name: given[name] for name in names})
+    needed = (each.name for each in fields(MindlinLaw) if each.default is MISSING or each.name in given)
+    return MindlinLaw(**{name: given[name] for name in needed})
 
 
 def parameters_of(packing: Packing) -> dict[str, Any]:

@@ -14,33 +14,20 @@ import numpy as np
 
 from ..errors import PackingFileError
 from ..responses.signals import Signal, SignalError
-from .atomic_write import read_plain
+from .atomic_write import read_plain, telling
 from .formats.tables import columns_of, strip_comments
 
 
 def read_signal(path: str | Path, channel: str | None = None) -> Signal:
-    """A signal from a file.
+    """A signal from a file of two columns, time and value, with spaces or a comma between them, and comments after #.
 
-    Parameters
-    ----------
-    path : str or Path
-        Two columns, time and value, separated by spaces or a comma, with comments after #; or a record.
-    channel : str, optional
-        Which trace of a record with several: its id, as in BW.RJOB..EHZ, or the end of that.
-
-    Raises
-    ------
-    SignalError
-        If there is no such file, or it holds no signal.
+    Or from a record, of which `channel` is the id of a trace, as in BW.RJOB..EHZ, or the end of that. Raises
+    SignalError if there is no such file, or it holds no signal.
     """
     path = Path(path)
     try:
         content = read_plain(path)
-    except OSError as error:
-        raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
-    lines = content.decode("ascii", "ignore").replace(",", " ").splitlines()
-    rows = list(strip_comments(lines, 1))
-    try:
+        rows = list(strip_comments(content.decode("ascii", "ignore").replace(",", " ").splitlines(), 1))
         # a table is text whose first line that is no comment begins with a number
         if b"\0" in content or not rows or not re.match(r"[-+]?\.?\d|[-+]?(nan|inf)", rows[0][1][0], re.IGNORECASE):
             return of_trace(_record(path, channel))
@@ -48,6 +35,8 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
             raise SignalError("a table of two columns has no channels: leave channel out")
         wanted = "two are needed, time and value"
         return Signal(*columns_of(path, rows, ("time", "value"), wanted, more=False).values())
+    except OSError as error:
+        raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
     except PackingFileError as error:
         raise SignalError(str(error).rstrip(".")) from None
     except SignalError as error:
@@ -61,15 +50,10 @@ def write_table(signal: Signal, path: Path) -> None:
 
 def _record(path: Path, channel: str | None) -> Any:
     """The trace of a record that is meant."""
-    try:
+    with telling(path, "is no table of two columns, and no record that pip install 'faultgouge[seismic]' reads"):
         from obspy import read
 
         traces = list(read(str(path)))
-    except ImportError:
-        raise SignalError('it is no table of two columns; records need pip install "faultgouge[seismic]"') from None
-    except Exception as error:  # whatever the reader of the format raises on a broken file
-        reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
-        raise SignalError(f"it is no table of two columns, and no record ({reason}): give another file") from None
     found = [trace for trace in traces if channel is None or trace.id.endswith(channel)]
     if len(found) != 1:
         fits = "it has" if channel is None else f'channel = "{channel}" fits {len(found) or "none"} of'

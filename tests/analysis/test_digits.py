@@ -31,8 +31,6 @@ def test_digits(value, error, text):
 @given(value=st.floats(1e-3, 1e3), error=st.floats(1e-13, 1e-1))
 def test_what_is_written_contains_the_interval(value, error):
     shown, units = re.fullmatch(r"([\d.]+)\((\d+)\)", with_uncertainty(value, error)).groups()
-    places = len(shown.partition(".")[2])
-    allowed = int(units) * 10.0**-places
-    assert error <= allowed * (1 + 1e-6)
-    assert abs(float(shown) - value) <= 0.5 * 10.0**-places * (1 + 1e-6) + 4e-16 * value
-    assert allowed <= 2.2 * error
+    unit = 10.0 ** -len(shown.partition(".")[2])
+    assert error / (1 + 1e-6) <= int(units) * unit <= 2.2 * error
+    assert abs(float(shown) - value) <= 0.5 * unit * (1 + 1e-6) + 4e-16 * value

@@ -44,14 +44,12 @@ def bed(request) -> Configuration:
     return make(request.param)
 
 
-def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = True) -> Configuration:
+def make(d: int, *, slides: bool = True) -> Configuration:
     """Six particles in no balance, every two of which touch, with a wall below the first two."""
     rng, n = np.random.default_rng(7 + d), 6
     position = np.zeros((n, 3))
-    position[:, :d], (i, j) = rng.normal(size=(n, d)), np.triu_indices(n, 1)
-    radius = rng.uniform(0.5, 1.0, n)
-    if walls:
-        i, j = np.append(i, [0, 1]), np.append(j, [-1, -1])
+    position[:, :d], radius = rng.normal(size=(n, d)), rng.uniform(0.5, 1.0, n)
+    i, j = np.hstack([np.triu_indices(n, 1), [[0, 1], [-1, -1]]])
     wall, count = j < 0, len(i)
     branch = np.where(wall[:, None], np.eye(3)[d - 1] * 0.9, position[i] - position[j])
     distance = np.linalg.norm(branch, axis=1)
@@ -60,13 +58,11 @@ def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = 
     tangential -= normal * np.sum(normal * tangential, axis=1)[:, None]
     arms = np.column_stack([radius[i], np.where(wall, 0, radius[j])])
     lever, slope = np.where(arms > 0, arms - 0.5 * overlap[:, None], 0), np.full(count, 0.5)
-    if arms_meet:
-        lever, slope = np.column_stack([0.4 * distance, 0.6 * distance]), np.zeros(count)
     fn, size = rng.uniform(1, 2, count), np.linalg.norm(tangential, axis=1)
     sliding = slides & (np.arange(count) % 3 == 0)
     contacts = LinearisedContacts(
         i=i, j=j, normal=normal, distance=np.where(wall, np.inf, distance), overlap=overlap,
-        slip_arm=lever if arms_meet else arms, lever_arm=lever, lever_slope=slope, normal_force=fn,
+        slip_arm=arms, lever_arm=lever, lever_slope=slope, normal_force=fn,
         tangential_force=tangential, normal_stiffness=1.5 * fn / overlap,
         tangential_stiffness=rng.uniform(50, 90, count), closing=0.5 * tangential / overlap[:, None],
         parting=0.5 * tangential / overlap[:, None], friction=np.where(sliding, size, 10 * size), sliding=sliding,
@@ -230,7 +226,7 @@ def test_rescaling_is_half_of_the_difference_of_both_derivatives(bed):
 
 def test_onset_of_a_family_of_snapshots():
     """Tangential forces grow with the load; bisection with all eigenvalues finds the same edge."""
-    still = make(2, arms_meet=True, slides=False)
+    still = make(2, slides=False)
     # without large pushes along contacts, which buckle
     c = derive_frozen(still.contacts, normal_force=1e-3 * still.contacts.normal_force)
 
@@ -305,8 +301,8 @@ def test_k_and_c_are_sums_over_contacts(bed):
 
 
 def test_spin_about_the_only_contact_costs_nothing():
-    bed = make(3, walls=False, slides=False)
-    two = derive_frozen(bed, contacts=bed.contacts.chosen(np.arange(1)))
+    bed = make(3, slides=False)
+    two = derive_frozen(bed, contacts=bed.contacts.chosen([0]))
     assert list(two.rattlers) == [2, 3, 4, 5]
     found = spectrum(two)
     # three translations and three twists or common turns, and the soft ones of a force that is not in balance

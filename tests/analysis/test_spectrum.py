@@ -193,10 +193,3 @@ def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():
     np.testing.assert_allclose(negative_eigenvalues(columns), expected, rtol=1e-9)
     stable = replace(columns, contacts=Contacts(floor, np.full(1005, -1), np.zeros(1005)))
     assert len(negative_eigenvalues(stable)) == 0
-
-
-def test_imaginary_part_grows_as_the_root_of_the_distance(path):
-    onset = 0.021833056408868
-    near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
-    # The next order is the distance over the width of the window, 1e-2.
-    assert near / nearer == pytest.approx(10, rel=1e-2)

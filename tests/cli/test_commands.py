@@ -28,14 +28,6 @@ def _scene(tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory, faultgouge_here_in):
-    """A folder with run.h5, the whole ramp of the scene, and what the command printed."""
-    folder = tmp_path_factory.mktemp("whole")
-    (folder / "scene.toml").write_text(SCENE)
-    return folder, json.loads(faultgouge_here_in(folder, "ramp", "scene.toml", "--json").stdout)
-
-
 def test_ramp_to_a_load_that_the_file_went_beyond(faultgouge_here, tmp_path):
     """Nothing is computed, and the load is not the last one of the file."""
     said, files = [], []
@@ -46,19 +38,6 @@ def test_ramp_to_a_load_that_the_file_went_beyond(faultgouge_here, tmp_path):
     assert "F_x = 0 reached" in said[0]
     assert said[1] == "run.h5 goes on from F_x = 0.006, where ramp.until ends, to F_x = 0: nothing is left to compute\n"
     assert files[0] == files[1]
-
-
-@pytest.mark.slow
-def test_ramp_as_json(whole):
-    folder, printed = whole
-    assert [row["fx"] for row in printed["equilibria"]] == [k * 1e-3 for k in range(5)]
-    for row in printed["equilibria"]:
-        assert row["residual"] < 1.5 * row["floor"] < 1.5e-10
-        assert row["contacts"] == 191
-    assert sorted(path.name for path in folder.iterdir()) == ["run.h5", "scene.toml"]
-    with RunFile(folder / "run.h5") as file:
-        assert len(file) == 5
-        assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
 
 
 @pytest.mark.long
@@ -77,13 +56,20 @@ def test_a_ramp_says_which_way_it_took(faultgouge, tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.slow
-def test_a_ramp_that_was_cut_off_on_two_ranks_goes_on_on_one_and_both_write_the_same(
-    faultgouge, faultgouge_here, tmp_path, whole
-):
+def test_a_ramp_as_json_and_cut_off_on_two_ranks_and_continued_on_one(faultgouge, faultgouge_here, tmp_path):
+    """Both write the same."""
+    printed = json.loads(faultgouge_here("ramp", "scene.toml", "--json").stdout)["equilibria"]
+    assert [(row["fx"], row["contacts"]) for row in printed] == [(k * 1e-3, 191) for k in range(5)]
+    assert all(row["residual"] < 1.5 * row["floor"] < 1.5e-10 for row in printed)
+    assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "scene.toml"}
+    with RunFile(tmp_path / "run.h5") as file:
+        assert json.loads(file.attributes["scene"])["ramp"]["until"] == 4e-3
+    whole = results(tmp_path)
+    (tmp_path / "run.h5").unlink()
     for until, run in (("until = 0.002", partial(faultgouge, ranks=2)), ("until = 0.004", faultgouge_here)):
         (tmp_path / "scene.toml").write_text(SCENE.replace("until = 0.004", until))
         run("ramp", "scene.toml")
-    assert difference(results(whole[0]), results(tmp_path)) == ""
+    assert difference(whole, results(tmp_path)) == ""
 
 
 @pytest.mark.slow
@@ -107,14 +93,14 @@ def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgou
     assert done.stderr.endswith("written to perturb.h5\n")
     assert (series["growth"], series["predicted_rate"], series["time_needed"]) == (None, 0, None)
     assert "linearly stable" in series["says"]
-    assert series["time"][-1] == pytest.approx(0.5, abs=1e-3)
     # a stable packing at rest: D stays at the rounding of coordinates, the residual over the softest mode squared
     assert 0 < max(series["msd"]) < 1e-22
     with RunFile(tmp_path / "perturb.h5") as file:
-        path, start = file.series("trajectory"), file.packing()
-        assert file.series("undamped")["msd"].tolist() == series["msd"]
+        path, start, stored = file.series("trajectory"), file.packing(), file.series("undamped")["msd"]
     assert (start.fx, path["time"].tolist()) == (1.5e-3, series["time"])
-    assert mean_square_displacement(path["position"], start.position, start.box_length).tolist() == series["msd"]
+    assert series["time"][-1] == pytest.approx(0.5, abs=1e-3)
+    moved = mean_square_displacement(path["position"], start.position, start.box_length)
+    assert moved.tolist() == stored.tolist() == series["msd"]
 
 
 @pytest.mark.slow
@@ -126,7 +112,7 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
             assert np.array_equal(dumped.contacts.slip, stored.contacts.slip)
             assert dumped.fx == stored.fx
     printed = json.loads(faultgouge_here("spectrum", beyond / "ramp.2.disks", "--json").stdout)
-    assert printed["eigenvalues"] == [[v.real, v.imag] for v in spectrum(dumped).eigenvalues.tolist()]
+    assert [complex(*each) for each in printed["eigenvalues"]] == spectrum(dumped).eigenvalues.tolist()
     # the forces were balanced, so that what was read is what was written
     assert (printed["fx"], printed["residual"] < 1.2e-10) == (0.012, True)
 
@@ -142,10 +128,9 @@ def test_every_command_has_help_with_an_example_and_the_overview_its_first_sente
     _, table = faultgouge_here("--help").stdout.split("Commands:")
     text = " ".join(table.split())
     assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
-    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
-    named = set(re.findall(r"^  (\w+)  ", table, re.MULTILINE))
-    assert named >= {"settle", "onset", "spectrum", "explain", "report", "extremes", "reproduce", "import", "modes"}
-    for command in named:
+    commands = re.findall(r"^  (\w+)  ", table, re.MULTILINE)
+    assert len(commands) > 20
+    for command in commands:
         shown = faultgouge_here(command, "--help").stdout
         assert "Example" in shown
         assert "\\" not in shown  # plain text escapes no brackets

@@ -90,8 +90,8 @@ def folders(tmp_path_factory, lmp_of_the_environment):
             for path in (places[name] / who / file for who in ("lmp", "here")):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(fill)
-        told = {"cwd": places[name] / "lmp", "env": environment, "capture_output": True, "check": False, "timeout": 60}
-        subprocess.run([program, "-in", "deck.in"], **told)
+        command = [program, "-in", "deck.in"]
+        subprocess.run(command, cwd=places[name] / "lmp", env=environment, capture_output=True, check=False, timeout=60)
     decks = {str(place / "here" / "deck.in"): name for name, place in places.items()}
     fresh = {key: value for key, value in os.environ.items() if key != "LAMMPS_PLUGIN_PATH"}  # as in a user's shell
     command = [sys.executable, "-c", RUN_THEM, *decks]

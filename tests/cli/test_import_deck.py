@@ -79,12 +79,10 @@ SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -
 @pytest.mark.parametrize("walls", [1, 2])
 def test_walls_that_hand_out_no_contacts(taken, walls):
     """The word `contacts` changes no motion, and the contacts are found without it, in a corner of two walls, too."""
-    found = {}
-    for word in ("contacts", ""):
-        deck, shape = (DECK, ROUND) if walls == 1 else (DECK.replace("fix move", SIDE), ROUND | {"down": "-0.3 0 -1"})
-        _, found[word] = taken(deck.format(**shape, word=word), name=f"pile{word}")
-    one, other = (found[word].contacts for word in ("contacts", ""))
-    assert found[""].operators == "laws"
+    deck, shape = (DECK, ROUND) if walls == 1 else (DECK.replace("fix move", SIDE), ROUND | {"down": "-0.3 0 -1"})
+    told, without = (taken(deck.format(**shape, word=word))[1] for word in ("contacts", ""))
+    one, other = told.contacts, without.contacts
+    assert without.operators == "laws"
     assert np.array_equal(one.i, other.i)
     assert np.array_equal(np.unique(one.i[one.wall], return_counts=True)[1], [1, 1, 1] if walls == 1 else [2, 1, 1])
     for name in ("normal", "overlap", "normal_force", "tangential_force", "tangential_stiffness"):
@@ -101,12 +99,10 @@ def test_what_has_been_poured_comes_to_rest(taken):
     """A deck that ends while its particles move, with fix pour, which lets no time step be changed; and with a region
     that may move, but stays."""
     said, _ = taken(pour(), code=1)
-    assert "The packing moves: the residual of particle" in said
-    assert "bring it to rest by faultgouge.relax(lmp), in a command --relax, or" in said
+    assert re.search("The packing moves: the residual of particle .* bring it to rest by .* a command --relax", said)
     _, found = taken(pour(), "--relax")
-    assert (len(found), found.operators) == (5, "differences")
+    assert (len(found), found.operators, found.proof < 1e-5) == (5, "differences", True)
     assert found.residual < 1e-7 * found.mass.mean()
-    assert found.proof < 1e-5
 
 
 def test_a_run_that_fix_halt_has_ended(taken):
@@ -122,7 +118,7 @@ def test_a_run_that_fix_halt_has_ended(taken):
 def test_a_deck_on_two_ranks(faultgouge, taken, tmp_path):
     """A look needs a copy of the process. What several ranks have run is taken by a process of one, a step on."""
     _, one = taken(PILE[""])
-    assert "3 spheres, " in faultgouge("import", "pile.in", "-o", "two.h5", ranks=2).stdout
+    faultgouge("import", "pile.in", "-o", "two.h5", ranks=2)
     two = read_configuration(tmp_path / "two.h5")
     assert two.position == pytest.approx(one.position, abs=1e-9)
     assert two.contacts.tangential_force == pytest.approx(one.contacts.tangential_force, abs=1e-7)
@@ -133,12 +129,10 @@ def test_a_line_at_which_lammps_stops(faultgouge_here, taken, tmp_path):
     """The state of the runs before it is kept."""
     deck = PILE["contacts"].replace("run 6000", "run 1500\ncompute what all no/such/style")
     said, _ = taken(deck, name="stops", code=1)
-    assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
-    assert "is kept in stops.restart, and the deck stops.restart.in beside it goes on from there" in said
+    assert re.search("LAMMPS stopped: Unrecognized compute style .* is kept in stops.restart, and the deck stops", said)
     assert "3 spheres, " in faultgouge_here("import", "stops.restart", "--relax", "-o", "stops.h5").stdout
     said, _ = taken(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"), name="lost", code=1)
-    assert "Lost atoms: original 3 current 0" in said
-    assert "The state is not kept: LAMMPS stopped: Lost atoms" in said
+    assert re.search("Lost atoms: original 3 current 0.*The state is not kept: LAMMPS stopped: Lost atoms", said)
     assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 
@@ -158,10 +152,8 @@ def test_any_model_in_a_region(faultgouge_here, taken):
     bowl = f"region bowl sphere 0 0 3 3 side in\nfix bowl all wall/gran/region granular {COHESIVE} region bowl"
     deck = re.sub("(?m)^fix floor .*$", bowl, of_granular(COHESIVE)).replace("run 6000", "run 30000")
     said, found = taken(deck)
-    for words in ("3 spheres, ", "K and C by differences of forces to ", "largest stable time step "):
-        assert words in said
-    assert found.operators == "differences"
-    assert found.operator_error < 1e-5
+    assert re.search("(?s)3 spheres, .*K and C by differences of forces to .*largest stable time step ", said)
+    assert (found.operators, found.operator_error < 1e-5) == ("differences", True)
     assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)
     faultgouge_here("export", "pile.h5", "--mode", "1", "-o", "pile.vtp")
 
@@ -193,8 +185,8 @@ def test_a_state_that_moves_is_kept(faultgouge_here, taken, tmp_path, name):
     assert not (tmp_path / f"{name}.h5").exists()
     again = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5", code=1).stderr
     assert f"is kept in {kept.name.replace('.restart', '.1.restart').replace('1.1', '3')}, and" in again
-    beside = kept.with_name(f"{kept.name}.in")
-    beside.write_text(beside.read_text() + "run 4499\n")
+    with kept.with_name(f"{kept.name}.in").open("a") as beside:
+        beside.write("run 4499\n")
     faultgouge_here("import", kept.name, "-o", "on.h5")
     on, (_, whole) = read_configuration(tmp_path / "on.h5"), taken(deck, name="whole")
     # the first step after a restart has the dashpots of another half step, a force of 1e-4 here
@@ -207,8 +199,8 @@ def test_bare_files_of_lammps(refusal, taken):
     """A restart or data file without contacts and laws: a deck around it has these."""
     ends = "run 10\nwrite_restart pile.restart\nwrite_data pile.data\n"
     taken(PILE[""].replace("run 6000", ends), "--balance", "1e9")
-    for kind, words in (("restart", "read_restart"), ("data", "units lj")):
-        assert f"write a deck with {words}" in refusal("import", f"pile.{kind}")
+    assert "write a deck with read_restart" in refusal("import", "pile.restart")
+    assert "write a deck with units lj" in refusal("import", "pile.data")
 
 
 def test_packing_in_which_nothing_touches(faultgouge_here, taken):
@@ -219,11 +211,7 @@ def test_packing_in_which_nothing_touches(faultgouge_here, taken):
     assert "no frame 3" in faultgouge_here("draw", "pile.h5", "--frame", "3", code=2).stderr
 
 
-# a row of three in a periodic box, and two above
-LAYERS = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
-PLACED = "create_box 1 box\n" + "".join(f"create_atoms 1 single {x} {y} 0 units box\n" for x, y in LAYERS)
-ROW = re.sub("(?m)^create_atoms .*\n", "", DISKS).replace("create_box 1 box\n", PLACED)
-ROW = ROW.replace("boundary f", "boundary p").replace("-2 2", "-1.51 1.51", 1).replace("run 6000", "run 20000")
+ROW = (Path(__file__).parent / "row.in").read_text()
 LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
 AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
 RISES, FOLLOWS = pour(rise="1e-6*elapsed"), "LAMMPS's forces change with the time, though nothing moves: a load, a wall"
@@ -232,19 +220,14 @@ REFUSED = [
     ("pile.in --balance nan", DISKS, 2, "greater than or equal to 0"),
     ("a.csv --balance 1", "", 2, "--balance is for a LAMMPS deck"),
     ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),
-    ("pile.lammps", DISKS, 2, "LAMMPS decks (.in, in.NAME)"),
+    ("pile.lammps", DISKS, 2, "a LAMMPS deck (.in)"),
     ("lig.in", "atom_style granular\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", "units si\nhard_particles yes\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", f"{LIGGGHTS}fix m1 all property/global youngsModulus peratomtype 5.e6\n", 1, "of LIGGGHTS, whose"),
     ("cleared.in", f"{DISKS}clear\n", 1, "no pair_style after `clear`, which takes all away"),
     ("mute.in", f"echo none\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out"),
     ("mute.in", f"echo log\n{DISKS}", 1, "no pair_style: leave `echo none` and `echo log` out"),
-    (
-        "empty.in",
-        re.sub("(?m)^(create_atoms|set) .*\n", "", PILE[""]),
-        1,
-        "has no particles. No state is kept, as there",
-    ),
+    ("empty.in", re.sub("(?m)^(create_atoms|set) .*\n", "", PILE[""]), 1, "has no particles. No state is kept"),
     # a part of an intersection: its place is another one in each run
     ("rises.in", RISES, 1, FOLLOWS),
     ("rises.in --relax", RISES, 1, FOLLOWS),
@@ -267,12 +250,10 @@ def test_what_is_refused_is_said_with_its_cause(faultgouge_here, tmp_path, words
 def test_contacts_at_the_bound(faultgouge_here, taken):
     """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
     c = taken(ROW, name="rough")[1].contacts
-    used = np.linalg.norm(c.tangential_force, axis=1) / c.normal_force
-    mu = used[~c.wall].max() * (1 - 1e-7)
+    mu = (np.linalg.norm(c.tangential_force, axis=1) / c.normal_force)[~c.wall].max() * (1 - 1e-7)
     said, found = taken(f"{ROW}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n", name="slid")
     count = int(found.contacts.at_bound.sum())
-    assert count > 0
-    assert f"{count} at Coulomb's bound, sticking in K" in said
+    assert 0 < count == int(re.search(r"(\d+) at Coulomb's bound, sticking in K", said)[1])
     verdict, *_ = faultgouge_here("spectrum", "slid.h5").stdout.partition("5 disks")
     assert f"{count} of {len(c)} contacts are at Coulomb's bound: each slides on ahead" in verdict
 

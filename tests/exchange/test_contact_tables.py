@@ -39,42 +39,28 @@ run 0
     return folder, found
 
 
-def six(values):
-    return " ".join(f"{each:.6g}" for each in values)
-
-
 def write_tables(folder, packing):
-    """The same contacts as the other codes write them."""
-    c = packing.contacts
-    first, second = packing.ids[c.i], packing.ids[c.j]
-    whole = c.normal_force[:, None] * c.normal + c.tangential_force
-    size = np.linalg.norm(c.tangential_force, axis=1)
-    along = c.tangential_force / size[:, None]
-    zero = np.zeros((len(c), 3))
-    about = [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
-    fstat = np.column_stack(about)
-    pairs = list(
-        zip(first, second, c.normal_force, c.normal_force[:, None] * c.normal, c.tangential_force, whole, strict=True)
-    )
+    """The same contacts with six digits, as the other codes write them."""
+    c, zero = packing.contacts, np.zeros((len(packing.contacts), 4))
+    ids = np.column_stack([packing.ids[c.i], packing.ids[c.j]])
+    fn, ft, size = c.normal_force[:, None], c.tangential_force, np.linalg.norm(c.tangential_force, axis=1)[:, None]
     head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n{len(c)}\nITEM: BOX BOUNDS pp pp pp\n" + 3 * "0 1\n"
     head += f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}"
-    rows = {
-        # MercuryDPM: each contact from both sides, and here with the tangential force of the second
-        "mercury.fstat": ["# 0 16", "# info", "# info", *map(six, fstat)],
-        # YADE: forces on the second
-        "yade.txt": [
-            "id1 id2 fnx fny fnz fsx fsy fsz",
-            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, _, n, t, _ in pairs),
-        ],
-        # LIGGGHTS: pos id force, from either side
-        "liggghts.dump": [head, *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, *_, f in pairs)],
-        "table.csv": [
-            "id1,id2,fn,ftx,fty,ftz",
-            *(f"{a} {b} {six([f, *t])}".replace(" ", ",") for a, b, f, _, t, _ in pairs),
-        ],
+    tables = {
+        # each contact from both sides, and here with the tangential force of the second
+        "mercury.fstat": (
+            "# 0 16\n# info\n# info",
+            [zero[:, :1], ids - 1, zero[:, :3], c.overlap[:, None], zero[:, :1], fn, size, c.normal, -ft / size],
+        ),
+        # forces on the second
+        "yade.txt": ("id1 id2 fnx fny fnz fsx fsy fsz", [ids - 1, -fn * c.normal, -ft]),
+        # pos id force, from either side
+        "liggghts.dump": (head, [zero, zero[:, :2], ids[:, ::-1], zero[:, :1], -(fn * c.normal + ft)]),
+        "table.csv": ("id1,id2,fn,ftx,fty,ftz", [ids, fn, ft]),
     }
-    for name, lines in rows.items():
-        (folder / name).write_text("\n".join([*lines, ""]))
+    for name, (names, columns) in tables.items():
+        mark = "," if name == "table.csv" else " "
+        np.savetxt(folder / name, np.hstack(columns), "%.6g", mark, header=names, comments="")
 
 
 LOCAL = ["index", "id1", "id2", "dist", "fn", "ftx", "fty", "ftz"]
@@ -163,11 +149,3 @@ def test_spheres_come_from_any_format_with_radii(live, tmp_path, suffix):
     np.testing.assert_array_equal(found.radius, packing.radius[order])
     np.testing.assert_allclose(found.mass, packing.mass[order], rtol=1e-15)
     np.testing.assert_allclose(found.box, packing.box, rtol=1e-15)
-
-
-@pytest.mark.parametrize("head", ["# two spheres\n# of a laboratory\nx,y,z,radius\n", "#x y z radius\n"])
-def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path, head):
-    """As in the example disks.csv; the names of YADE stand in a comment themselves."""
-    rows = "0,0,0,0.5\n0.99,0,0,0.5\n"
-    (tmp_path / "told.csv").write_text(head + (rows if "," in head else rows.replace(",", " ")))
-    assert read_particles(tmp_path / "told.csv").position.tolist() == [[0, 0], [0.99, 0]]

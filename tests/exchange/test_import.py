@@ -24,13 +24,13 @@ from faultgouge.pywrap.lammps import restart_file
 LAW = ("--kn", "2e5", "--fy", "3")
 
 
-def table(packing, names, mark=" ", digits="%.17g", **more):
+def table(packing, names, mark=" ", **more):
     """A line a disk: what the packing, or another column, has by these names."""
     x, y = packing.position.T
     known = {"id": np.arange(1, len(x) + 1), "x": x, "y": y, "z": 0 * x, "radius": packing.radius}
     known |= {"top": packing.top, "type": 1 + packing.top} | more
     rows = zip(*(known[name].tolist() for name in names), strict=True)
-    return "".join(mark.join(digits % number for number in row) + "\n" for row in rows)
+    return "".join(mark.join(f"{number:.17g}" for number in row) + "\n" for row in rows)
 
 
 def csv(packing, names):
@@ -54,10 +54,10 @@ def read_to_the_bit(path, text, packing):
     return disks
 
 
-def yade(packing, columns="x_y_z_r", digits="%.17g"):
-    """As yade.export.textExt writes it, which has %g."""
+def yade(packing, columns):
+    """As yade.export.textExt writes it, but for its six digits."""
     own = {"r": packing.radius, "matId": 1 + packing.top, "id": np.arange(len(packing)), "attrs": packing.mass}
-    return f"#format {columns}\n# mass\n{table(packing, columns.split('_'), digits=digits, **own)}"
+    return f"#format {columns}\n# mass\n{table(packing, columns.split('_'), **own)}"
 
 
 def mercury(packing, dimensions=2, times=(0.0, 0.5)):
@@ -78,9 +78,6 @@ def test_yade_text(tmp_path, sheared, columns):
     assert disks.box_length is None
     if "matId" in columns:
         np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)
-    (tmp_path / "short.txt").write_text(yade(sheared, columns, "%g"))
-    # half of the sixth digit
-    np.testing.assert_allclose(read_disks(tmp_path / "short.txt").position, sheared.position, rtol=5e-6)
 
 
 @pytest.mark.parametrize(("dimensions", "name"), [(2, "run.data"), (3, "run.data.0012")])
@@ -197,7 +194,6 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
 
 BAD = [
     ("a.dump", lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
-    ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "frames with 50 and 100 particles: choose one with --frame"),
     ("a.dump", lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions (z goes from 0 to 9)"),
     ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
     ("a.dump", lambda p: re.sub(r"(?m)^(0 11.9|-1 60|-0.5 0.5)$", r"\1 1", dump(p)), "tilted box"),
@@ -245,10 +241,8 @@ def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
         assert done.returncode == 0, done.stderr
         said[" ".join([program, *words[:1]])] = done.stdout + done.stderr
     assert "brought to rest" in said["faultgouge import"]
-    onset = re.search(r"F_x\^c = ([\d.]+)", said["faultgouge onset"])
-    assert onset
     with RunFile(tmp_path / "run.h5") as run:
-        assert 0 < float(onset[1]) < run.fx[-1]
+        assert 0 < float(re.search(r"F_x\^c = ([\d.]+)", said["faultgouge onset"])[1]) < run.fx[-1]
     assert "complex pair" in said["faultgouge draw"]
     assert (tmp_path / "mode.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "mode.gif").read_bytes().startswith(b"GIF89a")

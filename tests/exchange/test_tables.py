@@ -72,11 +72,10 @@ def test_types_have_names(read):
         upper_layer(disks, "type:Cu")
 
 
-def test_types_of_gsd_have_names(tmp_path):
+def test_gsd_of_another_program_has_names_of_types(tmp_path):
     hoomd = pytest.importorskip("gsd.hoomd", reason="gsd comes with the extra export")
-    frame, particles = hoomd.Frame(), {"N": 2, "position": [[0, 0.5, 0], [1, 0.5, 0]], "diameter": [1, 1]}
-    for name, value in (particles | {"typeid": [1, 0], "types": ["Al", "Fe"]}).items():
-        setattr(frame.particles, name, value)
+    frame, given = hoomd.Frame(), {"typeid": [1, 0], "types": ["Al", "Fe"], "diameter": [1, 1]}
+    vars(frame.particles).update(given | {"N": 2, "position": [[0, 0.5, 0], [1, 0.5, 0]]})
     frame.configuration.box = [9, 9, 0, 0, 0, 0]
     with hoomd.open(str(tmp_path / "a.gsd"), "w") as file:
         file.append(frame)

@@ -12,7 +12,7 @@ from faultgouge.figures.followed_pairs import follow_eigenvalues
 
 pytestmark = pytest.mark.slow
 
-TURN = 8
+TURN = 4
 """The equilibrium at which the ramp turns for the first time."""
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from ...arrays import Floats
 from ...configuration import Configuration
@@ -29,6 +29,8 @@ __all__ = [
     "Disks", "ModeVectors", "Slips", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
+
+Columns: TypeAlias = Mapping[str, Floats]
 
 RESTART_BEGINNING = b"LammpS RestartT"
 """How restarts of LAMMPS begin."""
@@ -75,14 +77,9 @@ def is_hdf5(path: Path) -> bool:
 
 
 def format_of(path: Path) -> Format:
-    """Find the format of a file by its first line, its suffix, or its prefix for LAMMPS files.
+    """The format of a file, by its first line, its suffix, or its prefix for LAMMPS files.
 
-    Raises
-    ------
-    PackingFileError
-        If no reader knows the format.
-    OSError
-        If the file cannot be read.
+    Raises PackingFileError if no reader knows it, OSError if the file cannot be read.
     """
     words, name = list[str](), path.name.lower().removesuffix(".gz")
     with suppress(OSError, UnicodeDecodeError, EOFError, zlib.error), open_text(path) as stream:
@@ -94,28 +91,17 @@ def format_of(path: Path) -> Format:
     found = READERS.get(Path(name).suffix) or {"data": DATA, "dump": DUMP}.get(name.split(".")[0])
     if found is None and begins_with(path, RESTART_BEGINNING):
         return RESTART
-    if found is None and is_hdf5(path):
-        raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
     if found is None:
-        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data"
-        raise PackingFileError(f"{path} is of no format that is read: give {names}, run.h5, or a LAMMPS deck (.in).")
+        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data, or a LAMMPS deck (.in)"
+        needs = "run.h5 needs no import: packing.file, draw and spectrum take it"
+        raise PackingFileError(f"{path} is of no format that is read: give {names}; a {needs}.")
     return found
 
 
 def read_particles(path: Path, frame: int | None = None) -> Disks:
-    """Read the particles in a file of another code, disks or spheres.
+    """Read the particles in a file of another code, disks or spheres, of the frame of a number, by default the last.
 
-    Parameters
-    ----------
-    path : Path
-        The file, of a format of `READERS`.
-    frame : int, optional
-        Number of the frame; negative numbers count from the last.
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, has no known format, is a restart, or has no particles.
+    Raises PackingFileError if the file is missing, has no known format, is a restart, or has no particles.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
@@ -125,7 +111,7 @@ def read_particles(path: Path, frame: int | None = None) -> Disks:
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     with telling(path, f"is not read as {found.words}"):
-        read: Disks = _function(found.reader)(path, *([frame] if found.frames else []))
+        read: Disks = _function(found.reader)(path, *([-1 if frame is None else frame] if found.frames else []))
     return read
 
 
@@ -141,44 +127,22 @@ def _function(name: str) -> Any:
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
-    taken, what = (FILMS, "several frames go into") if frames else (tuple(WRITERS)[:-1], "exports are")
-    if path.suffix not in taken:
-        more = "" if frames else "; for a .pvd add --frames all"
-        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}{more}; give it one of these suffixes.")
+    one = tuple(WRITERS)[:-1]
+    if path.suffix not in (FILMS if frames else one):
+        ways = f"exports are {', '.join(one)}, and with --frames {', '.join(FILMS)}"
+        raise BadInputError(f"-o {path}: {ways}; give it one of these suffixes.")
     if modes and path.suffix in (".data", ".csv"):
         raise BadInputError(f"-o {path}: it has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
 def write_packing(
-    path: Path,
-    packing: Packing | Configuration,
-    modes: Sequence[ModeVectors] = (),
-    values: Mapping[str, Floats] | None = None,
+    path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = (), values: Columns | None = None
 ) -> str:
-    """Write a packing for another code.
+    """Write a packing for another code, with modes, and with further columns of the particles (.vtp, .xyz, .gsd).
 
-    Parameters
-    ----------
-    path : Path
-        The file; its suffix is the format.
-    packing : Packing or Configuration
-        The packing.
-    modes : sequence of ModeVectors
-        Modes to write with the packing.
-    values : mapping of ndarray, each of shape (N,), optional
-        Further columns of the particles, by name; for .vtp, .xyz and .gsd.
-
-    Returns
-    -------
-    str
-        Description of the contents, and of what the format cannot store.
-
-    Raises
-    ------
-    BadInputError
-        If the suffix is none of an export, or the format has no modes.
-    OutputError
-        If the file cannot be written.
+    The suffix is the format. Returned are, in words, the contents, and what the format cannot store. Raises
+    BadInputError if the suffix is none of an export, or the format has no modes; OutputError if the file cannot be
+    written.
     """
     check_writer(path, bool(modes))
     found = exported(packing, modes)
@@ -193,12 +157,7 @@ def write_packing(
 def write_frames(path: Path, frames: Iterable[tuple[float, Exported]]) -> None:
     """Write the frames of a ramp or of an undamped run (`frames_of`) for another code; the suffix is the format.
 
-    Raises
-    ------
-    BadInputError
-        If the suffix is not in `FILMS`.
-    OutputError
-        If the file cannot be written.
+    Raises BadInputError if it is not in `FILMS`, OutputError if the file cannot be written.
     """
     check_writer(path, frames=True)
     _function(WRITERS[path.suffix])(path, frames)

@@ -68,16 +68,9 @@ def standard_names(source: object, columns: Mapping[str, Floats], *needed: str) 
 
 
 class Slips(NamedTuple):
-    """Slips of contacts, by the IDs of their disks.
+    """Slips of contacts, along tau, length, with low parts if there are any, by the IDs of their disks; 0 is the floor.
 
-    Attributes
-    ----------
-    first, second : ndarray of int, shape (C,)
-        IDs; a second ID of 0 is the floor.
-    slip, low : ndarray, shape (C,)
-        Along tau, length; and low parts if there are any.
-    complete : bool
-        Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
+    If they are not `complete`, all touching disks are in contact, and contacts that are not listed have no slip.
     """
 
     first: Indices
@@ -95,14 +88,10 @@ class Disks:
     ----------
     source : str
         The file and the place in it, or another origin of the particles.
-    position : ndarray, shape (N, 2), of spheres (N, 3)
-        Centres, length.
-    radius : ndarray, shape (N,)
-        Radii, length.
-    id : ndarray of int, shape (N,)
-        IDs of the file; of disks from 1.
-    mass, angle, top, position_low : ndarray or None
-        Mass, orientation, whether in the upper layer, low parts of the centres; None if absent.
+    position, position_low : ndarray, shape (N, 2), of spheres (N, 3)
+        Centres, length, and their low parts, if there are any.
+    radius, id, mass, angle, top : ndarray, shape (N,)
+        Radii, length; IDs of the file, of disks from 1; mass, orientation, whether in the upper layer: None if absent.
     box_length : float or None
         Period along x; None if the sides are open.
     named : mapping of ndarray of bool, each of shape (N,)
@@ -142,14 +131,19 @@ class Disks:
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
-def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
-    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
-    wanted, few, many = -1 if frame is None else frame, min(counts, default=0), max(counts, default=0)
-    if frame is None and few < many:
-        raise PackingFileError(f"{path} has frames with {few} and {many} particles: choose one with --frame.")
-    if not -len(counts) <= wanted < len(counts):
-        raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
-    return wanted % len(counts)
+def places_of(ids: NDArray, known: Indices, source: object, elsewhere: NDArray | bool = False) -> Indices:
+    """Where IDs are among known ones, which are sorted; a PackingFileError for one that is not there, nor elsewhere."""
+    found = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+    for strange in ids[(known[found] != ids) & ~np.broadcast_to(elsewhere, ids.shape)]:
+        raise PackingFileError(f"{source}: a contact names particle {strange:g}, which is not there.")
+    return found
+
+
+def choose_frame(path: Path, count: int, frame: int) -> int:
+    """The number of the chosen one of some frames, from 0; negative numbers count from the end."""
+    if not -count <= frame < count:
+        raise PackingFileError(f"{path} has {count} frames; there is no --frame {frame}.")
+    return frame % count
 
 
 def particles_of(
@@ -223,24 +217,10 @@ def mass_of_density(density: Floats, radius: Floats) -> Floats:
 
 
 def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: float | None) -> Packing:
-    """Make a packing of disks under a law and a load.
+    """A packing of disks under a law and a load (fx, fy, inertia_factor, drag_time), with an upper layer, shape (N,).
 
-    Parameters
-    ----------
-    top : ndarray of bool, shape (N,)
-        The upper layer.
-    **load : float
-        fx, fy, inertia_factor, drag_time as for :class:`~faultgouge.analysis.Packing`.
-
-    Returns
-    -------
-    Packing
-        With slips that are not known, if there is friction, and the file does not give the slips of the contacts.
-
-    Raises
-    ------
-    PackingFileError
-        If disks lie below the floor or inside one another, or form no packing.
+    Its slips are not known if there is friction and the file does not give the slips of the contacts. Raises
+    PackingFileError if disks lie below the floor or inside one another, or form no packing.
     """
     place, radius, period, source = disks.position, disks.radius, disks.box_length, disks.source
     with telling(source, "describes no possible packing", ValueError):
@@ -264,45 +244,28 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     """Contacts with the slips of the file, of which disks that do not touch may have none."""
     ids = np.array([slips.first, slips.second])
-    ends = np.minimum(np.searchsorted(disks.id, ids), len(disks) - 1)
-    for strange in ids[(disks.id[ends] != ids) & (ids != 0)]:
-        raise PackingFileError(f"{disks.source}: a contact names disk {strange}, which is not there.")
-    ends[ids == 0] = FLOOR
+    ends = np.where(ids == 0, FLOOR, places_of(ids, disks.id, disks.source, ids == 0))
     i, j = np.where(ends[0] == FLOOR, ends[::-1], ends)
     listed = Contacts(i, j, slips.slip, slips.low)
     if slips.complete:
         return listed
     slip = {(i, j): s for i, j, s in zip(*(each.tolist() for each in (listed.i, listed.j, listed.slip)), strict=True)}
     found = near.slipped(np.array([slip.pop(pair, 0.0) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]))
-    for (i, j), size in slip.items():
-        if size:
-            both = f"{disks.id[i]} and {disks.id[j] if j >= 0 else 'the floor'}"
-            says = f"{both} have a slip and do not touch: leave such rows out, or give places and radii that touch"
-            raise PackingFileError(f"{disks.source}: {says}.")
+    for i, j in (pair for pair, size in slip.items() if size):
+        both = f"{disks.id[i]} and {disks.id[j] if j >= 0 else 'the floor'}"
+        says = f"{both} have a slip and do not touch: leave such rows out, or give places and radii that touch"
+        raise PackingFileError(f"{disks.source}: {says}.")
     return found
 
 
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
-    """Select the disks of the upper layer.
+    """The disks of the upper layer, as booleans, shape (N,).
 
-    Parameters
-    ----------
-    says : str or int, optional
-        A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
-        (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
-        layer of the file. Of a packing of which less than half touches something, which is not at rest yet, a number
-        is one of the highest of all disks.
-    key : str
-        What stands before the text where the user gives it, for messages.
-
-    Returns
-    -------
-    ndarray of bool, shape (N,)
-
-    Raises
-    ------
-    BadInputError
-        If no upper layer is given, the text is not understood, or it selects no disk.
+    `says` is a number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``,
+    ``ids:@FILE`` (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and"; by default the
+    upper layer of the file. Of a packing of which less than half touches something, which is not at rest yet, a number
+    is one of the highest of all disks. `key` is what stands before the text where the user gives it. Raises
+    BadInputError if no upper layer is given, the text is not understood, or it selects no disk.
     """
     y = disks.position[:, 1]
     if says is None and disks.top is None:
@@ -339,11 +302,9 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
         chosen = disks.named[text]
     elif kind == "ids" and value:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
-            if not re.fullmatch(r"\d+(-\d+)?", part):
-                raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
-            first, last = map(int, (part.split("-") * 2)[:2])
-            within = (first <= disks.id) & (disks.id <= last)
-            if within.sum() <= last - first:
+            first, _, last = part.partition("-")
+            within = (int(first) <= disks.id) & (disks.id <= int(last or first))
+            if within.sum() <= int(last or first) - int(first):
                 raise ValueError(f"{disks.source} has no disk {part}")
             chosen |= within
     else:

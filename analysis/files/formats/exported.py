@@ -52,29 +52,14 @@ class ModeVectors(NamedTuple):
 
 
 class Exported(NamedTuple):
-    """The columns of an export.
+    """The columns of an export, of a Packing or a Configuration, the `source`.
 
-    Attributes
-    ----------
-    source : Packing or Configuration
-        What they are of.
-    position : ndarray, shape (N, 3)
-        Centres, length.
-    particles, contacts : dict of ndarray
-        Columns by name, of numbers or of vectors with three components; whole numbers are integers.
-    ends : ndarray, shape (C, 2, 3)
-        The centre of the first particle of each contact, and that of the nearest image of the second, or the foot on
-        the wall.
-    numbers : dict of float
-        Law, load, inertia, the time of a frame, eigenvalues of modes.
-    box : ndarray, shape (3, 3)
-        Edges of the box in rows.
-    periodic : tuple of bool
-        Along each edge.
-    origin : ndarray, shape (3,), or None
-        Lower corner of the box; None of a Packing.
-    rows : ndarray, shape (C, 3 or 4), or None
-        Contacts of a Packing, as it is read back; None where slips are not known.
+    `position`, shape (N, 3), are centres; `particles` and `contacts` columns by name, of numbers or of vectors with
+    three components, whole numbers as integers. `ends`, shape (C, 2, 3), are the centre of the first particle of each
+    contact, and that of the nearest image of the second, or the foot on the wall. `numbers` are law, load, inertia, the
+    time of a frame, eigenvalues of modes. `box`, shape (3, 3), has the edges of the box in rows, `periodic` says along
+    which it is, `origin` is its lower corner; None of a Packing. `rows`, shape (C, 3 or 4), are contacts of a Packing
+    as they are read back; None where slips are not known.
     """
 
     source: Packing | Configuration
@@ -95,15 +80,10 @@ def exported(
     displacement: Floats | None = None,
     time: float | None = None,
 ) -> Exported:
-    """The columns of a packing.
+    """The columns of a packing; of a Packing also its `displacement` since the first frame of a film, shape (N, 2).
 
-    Parameters
-    ----------
-    displacement : ndarray, shape (N, 2), optional
-        Of a Packing since the first frame of a film, length.
-    time : float, optional
-        Of a frame of an undamped run, of which positions alone are known: the contacts of the Packing are then all
-        disks that touch, and there are neither slips nor forces that follow from them.
+    With `time`, that of a frame of an undamped run, positions alone are known: the contacts of the Packing are then all
+    disks that touch, and there are neither slips nor forces that follow from them.
     """
     if isinstance(source, Configuration):
         return _of_configuration(source, modes)
@@ -128,11 +108,10 @@ def exported(
     more = {"tau": p.drag_time, "slips_known": None if p.slips_known else 0.0, "fx": p.fx, "fy": p.fy}
     more |= {"inertia_factor": p.inertia_factor, "box_length": p.box_length, "time": time}
     numbers = law_parameters(p.law) | {name: value for name, value in more.items() if value is not None}
-    largest, height = 2 * p.radius.max(), (p.position[:, 1] + p.radius).max()
-    width = 2 * np.ptp(p.position[:, 0]) + largest if p.box_length is None else p.box_length
-    first = p.position[c.i]
+    width = 2 * (np.ptp(p.position[:, 0]) + p.radius.max()) if p.box_length is None else p.box_length
+    box = np.diag([width, (p.position[:, 1] + p.radius).max(), 2 * p.radius.max()])
+    first, sides = p.position[c.i], (p.box_length is not None, False, False)
     ends = _in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1))
-    box, sides = np.diag([width, height, largest]), (p.box_length is not None, False, False)
     place, numbers = _in_space(p.position), numbers | eigenvalues
     return Exported(p, place, particles | vectors, contacts, ends, numbers, box, sides, rows=rows)
 
@@ -172,20 +151,10 @@ def _of_modes(
 def read_back(
     path: Path, values: Mapping[str, Any], rows: Sequence[float] | Floats | None, low: bool
 ) -> dict[str, Any]:
-    """Fields `given` and `slips` of Disks, of the numbers and the `Exported.rows` in a file, which may be another's.
-
-    Parameters
-    ----------
-    values : mapping
-        What the file has by name, law and load among these.
-    low : bool
-        Whether rows have low parts of slips.
-    """
+    """Fields `given` and `slips` of Disks, of what a file, which may be another's, has by name, and of `Exported.rows`
+    in it, if there are any; `low` tells whether these have low parts of slips."""
     check_format(values.get(FORMAT_KEY), path)
-    given = dict[str, float]()
-    for key in PARAMETER_NAMES & values.keys():
-        with suppress(TypeError, ValueError):
-            given[key] = float(values[key])
+    given = {key: float(values[key]) for key in PARAMETER_NAMES & values.keys()}
     if rows is None:
         return {"given": given}
     columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
@@ -212,27 +181,21 @@ def choose_frames(run: RunFile, says: str) -> range:
     Raises BadInputError if the text is neither, or selects no frame.
     """
     total = 1 + len(run.series("trajectory")["time"]) if "trajectory" in run.names_of_series else len(run)
-    try:
+    found = range(0)
+    with suppress(ValueError, TypeError):
         start, stop, *step = (int(part) if part else None for part in says.replace("all", ":").split(":"))
         found = range(total)[slice(start, stop, *step)]
-    except (ValueError, TypeError):
-        raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.") from None
     if not found:
-        raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
+        ways = "give all, START:STOP or START:STOP:STEP, counted from 0"
+        raise BadInputError(f"--frames {says} means none of the {total} frames of {run.path}: {ways}.")
     return found
 
 
 def frames_of(run: RunFile, numbers: range) -> Iterator[tuple[float, Exported]]:
-    """Times and frames of a run.h5, one after the other: of its undamped run if it has its trajectory, else of its
-    ramp, whose time is F_x, or the total path of F_x where there are turning points.
+    """Times and frames of a run.h5, which must stay open, one after the other, by numbers from `choose_frames`.
 
-    Parameters
-    ----------
-    run : RunFile
-        The file, which must stay open until the last frame has been read. Frame 0 of an undamped run is its initial
-        equilibrium.
-    numbers : range
-        From :func:`choose_frames`.
+    Of an undamped run with a trajectory these are its samples; frame 0 is its initial equilibrium. Else they are the
+    equilibria of the ramp, whose time is F_x, or the total path of F_x where there are turning points.
     """
     undamped = "trajectory" in run.names_of_series
     start, times = run.packing(-1 if undamped else 0), run.fx

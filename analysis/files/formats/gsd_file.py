@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, open_plain, replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, replace_whole, telling
 from .disks import Disks, choose_frame, particles_of
 from .exported import Exported, read_back
 
@@ -26,27 +26,21 @@ GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coord
 
 
 def _hoomd(path: Path) -> Any:
-    try:
+    with telling(path, "needs the library gsd, of pip install 'faultgouge[export]'", ImportError):
         return import_module("gsd.hoomd")
-    except ImportError:
-        needs = "needs the library gsd, which is not installed: pip install 'faultgouge[export]'"
-        raise PackingFileError(f"{path} {needs}.") from None
 
 
-def read_gsd(path: Path, frame: int | None = None) -> Disks:
-    """A frame of a GSD file; the last one by default, if all are of as many disks."""
-    hoomd = _hoomd(path)
-    open_plain(path).close()
-    with hoomd.open(str(path), "r") as file:
-        counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
-        shown = file[choose_frame(path, counts, frame)]
+def read_gsd(path: Path, frame: int) -> Disks:
+    """A frame of a GSD file."""
+    with _hoomd(path).open(str(path), "r") as file:
+        shown = file[choose_frame(path, len(file), frame)]
     log, particles = shown.log, shown.particles
     type_names = [particles.types[number] for number in particles.typeid] if particles.types else []
     columns = {key.removeprefix(OWN_QUANTITIES): log[key] for key in log if key.startswith(OWN_QUANTITIES)}
     if "x" in columns:
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
-        period, rows = values.get("box_length"), log.get(CONTACTS)
-        box = None if period is None else np.diag([float(period), 1.0, 1.0])
+        rows = log.get(CONTACTS)
+        box = np.diag([float(values["box_length"]), 1.0, 1.0]) if "box_length" in values else None
         more = read_back(path, values, None if rows is None else rows[rows[:, 0] > 0], "x_low" in columns)
     elif particles.diameter is None or not particles.N:
         raise PackingFileError(f"{path} has no disks with diameters.")
@@ -73,15 +67,16 @@ def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
 
 
 def _fill(frame: Any, e: Exported) -> None:
-    radius, mass = e.particles["radius"], e.particles["mass"]
-    zeros = np.zeros((len(radius), 2))
-    angle, flat = e.particles.get("angle", zeros[:, 0]), "fy" in e.numbers
-    box, middle = e.box.copy(), np.zeros(3)
-    if flat:  # a Packing: y = 0 is in the middle, so that the floor stays there
+    """The columns as particles of GSD, within a box whose middle is at 0.
+
+    Of a Packing y = 0 is in the middle, so that the floor stays there.
+    """
+    radius, mass, flat = e.particles["radius"], e.particles["mass"], "fy" in e.numbers
+    angle, zeros = e.particles.get("angle", np.zeros(len(radius))), np.zeros((len(radius), 2))
+    box, middle = e.box.copy(), np.zeros(3) if e.origin is None else e.origin + 0.5 * e.box.sum(axis=0)
+    if flat:
         box[1, 1] = 2 * (e.position[:, 1] + radius).max()
         box[0, 0] = box[0, 0] if e.periodic[0] else 2 * (np.abs(e.position[:, 0]).max() + radius.max())
-    elif e.origin is not None:
-        middle = e.origin + 0.5 * box.sum(axis=0)
     none = np.flatnonzero(np.diag(box) == 0)
     box[none, none] = np.ptp(e.position, axis=0)[none] + 2 * radius.max()
     images = np.floor((e.position - middle) @ np.linalg.inv(box) + 0.5) * e.periodic
@@ -89,10 +84,9 @@ def _fill(frame: Any, e: Exported) -> None:
     frame.configuration.box = [xx, yy, 0 if flat else zz, box[1, 0] / yy, box[2, 0] / zz, box[2, 1] / zz]
     frame.configuration.dimensions = 2 if flat else 3
     particles.N, particles.types, particles.typeid = len(radius), ["bed", "top"], e.source.top.astype(np.uint32)
-    particles.position = e.position - middle - images @ box
-    particles.diameter, particles.mass = 2 * radius, mass
+    particles.position, particles.diameter, particles.mass = e.position - middle - images @ box, 2 * radius, mass
     particles.orientation = np.column_stack([np.cos(0.5 * angle), zeros, np.sin(0.5 * angle)])
-    inertia = e.particles.get("inertia", e.numbers.get("inertia_factor", 0.4) * mass * radius**2)
+    inertia = e.numbers.get("inertia_factor", 0.4) * mass * radius**2
     particles.moment_inertia = np.column_stack([zeros if flat else np.tile(inertia, (2, 1)).T, inertia])
     own = {"x": e.position[:, 0], "y": e.position[:, 1], "angle": angle} | e.particles
     logged = {OWN_QUANTITIES + name: own[name] for name in ("x", "y", *OWN_COLUMNS) if flat and name in own}

@@ -12,8 +12,7 @@ Law, load and inertia are not part of a dump. They are given by the caller or by
 ".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
 inertia_factor. A law from the caller takes precedence.
 
-Of a dump custom, columns are x or xu, radius or diameter, and, if present, id, type, mass, theta. Several
-snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
+Of a dump custom, columns are x or xu, radius or diameter, and, if present, id, type, mass, theta.
 """
 
 from collections import deque
@@ -34,7 +33,7 @@ from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text, telling
 from ..runfile import law_of_parameters
-from .disks import Disks, Slips, choose_frame, in_plane, packing_of, particles_of, standard_names
+from .disks import Disks, Slips, choose_frame, in_plane, packing_of, particles_of, places_of, standard_names
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
@@ -43,18 +42,8 @@ TOP_TYPE = 2
 class DumpFrame(NamedTuple):
     """One snapshot of a LAMMPS text dump.
 
-    Attributes
-    ----------
-    step : int
-        LAMMPS's time step.
-    boundary : tuple of str
-        Boundary flags of the box, such as ("pp", "ff", "pp").
-    bounds : ndarray, shape (3, 2 or 3)
-        Lower and upper bounds of the box, and its tilts xy, xz, yz; length.
-    columns : tuple of str
-        Names of the columns.
-    rows : ndarray, shape (R, len(columns))
-        The numbers.
+    It has its time step, boundary flags of the box such as ("pp", "ff", "pp"), lower and upper bounds of the box with
+    the tilts xy, xz, yz, length, names of the columns, and the numbers, shape (R, columns).
     """
 
     step: int
@@ -103,15 +92,14 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
     return None
 
 
-def snapshot(path: Path, frame: int | None) -> DumpFrame:
-    """A snapshot by its number; by default the last one, if all are of as many particles."""
-    counts, kept = list[int](), deque[DumpFrame](maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
-    for shown in dump_frames(path):
+def snapshot(path: Path, frame: int) -> DumpFrame:
+    """A snapshot by its number."""
+    count, kept = 0, deque[DumpFrame](maxlen=max(-frame, 1))  # of a long file no more than is needed
+    for count, shown in enumerate(dump_frames(path), 1):
         kept.append(shown)
-        counts.append(len(shown.rows))
-        if len(counts) - 1 == frame:
+        if count - 1 == frame:
             break
-    choose_frame(path, counts, frame)
+    choose_frame(path, count, frame)
     return kept[0]
 
 
@@ -126,8 +114,8 @@ def _disks(path: Path, shown: DumpFrame, columns: dict[str, Floats]) -> Disks:
     return particles_of(f"{path} (step {shown.step})", columns, box, origin=low, periodic=sides)
 
 
-def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
-    """A snapshot of `dump custom`; the last one by default, if all are of the same particles."""
+def read_custom_dump(path: Path, frame: int) -> Disks:
+    """A snapshot of `dump custom`."""
     shown = snapshot(path, frame)
     return _disks(path, shown, shown.by_name)
 
@@ -158,10 +146,10 @@ def read_dump(disks: str | PathLike[str], *, frame: int = -1, law: MindlinLaw | 
     return packing_of(found, law or law_of_parameters(found.given), found.top, **load)
 
 
-def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None = None) -> Disks:
+def read_deck_dump(path: Path, frame: int, law: MindlinLaw | None = None) -> Disks:
     """Read a dump of write.in, with the slips of all contacts in its .contacts, and the numbers in its .params."""
     beside, sidecar = path.with_suffix(".contacts"), path.with_suffix(".params")
-    shown, given = snapshot(path, -1 if frame is None else frame), _numbers_in(sidecar)
+    shown, given = snapshot(path, frame), _numbers_in(sidecar)
     try:
         law = law or law_of_parameters(given)
     except KeyError as error:
@@ -180,10 +168,7 @@ def read_deck_dump(path: Path, frame: int | None = None, law: MindlinLaw | None 
         disk |= dict(zip(("x", "y", "x_low", "y_low"), (*place.T, *low.T), strict=True))
     found = _disks(path, shown, disk | {"top": disk["type"] == TOP_TYPE})
     ids, radius, position = found.id, found.radius, found.position[:, :2]
-    listed = np.array([pair["id1"], pair["id2"]])
-    i, j = np.minimum(np.searchsorted(ids, listed), len(ids) - 1)
-    if np.any(ids[[i, j]] != listed):
-        raise PackingFileError(f"{beside} has a contact of a disk that {path} does not have.")
+    i, j = places_of(np.array([pair["id1"], pair["id2"]]), ids, beside)
     # LAMMPS lists pairs up to its cutoff
     touch = np.hypot(*nearest_image(position[i] - position[j], found.box_length).T) < radius[i] + radius[j]
     floor = radius > position[:, 1]

@@ -87,18 +87,15 @@ def columns_of(
     return {str(names[k]): column for k, column in zip(kept, np.array(rows).reshape(-1, len(kept)).T, strict=True)}
 
 
-def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -> tuple[int, int]:
-    """First line of a frame and its number of particles, in a file of consecutive frames.
-
-    A frame begins with its number of particles; they follow after `head` lines. `frame` is as of `choose_frame`.
-    """
+def block_of_frame(path: Path, lines: list[str], head: int, frame: int) -> tuple[int, int]:
+    """First line of a frame and its number of particles, which follow after `head` lines, in a file of frames."""
     counts, at, end = dict[int, int](), 0, len("\n".join(lines).rstrip().split("\n"))
     while at < end:
         counts[at] = int(lines[at].split()[0])
         at += head + counts[at]
     if not counts or at > len(lines):
         raise PackingFileError(f"{path} is no complete file of frames: it breaks off.")
-    begin = list(counts)[choose_frame(path, list(counts.values()), frame)]
+    begin = list(counts)[choose_frame(path, len(counts), frame)]
     return begin, counts[begin]
 
 
@@ -189,8 +186,8 @@ def read_yade(path: Path) -> Disks:
     return particles_of(path, columns, first_id=0)
 
 
-def read_mercury(path: Path, frame: int | None = None) -> Disks:
-    """Particles at one time, counted from 0; the last one by default, if all times have as many particles."""
+def read_mercury(path: Path, frame: int) -> Disks:
+    """Particles at one time, counted from 0."""
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 1, frame)
     low, high = np.array(numbers_in(lines[begin], f"{path}, line {begin + 1}")[2:]).reshape(2, -1)

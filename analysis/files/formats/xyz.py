@@ -22,8 +22,8 @@ PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
 NAMES_OF_TYPES = ("species", "type", "element")
 
 
-def read_xyz(path: Path, frame: int | None = None) -> Disks:
-    """A frame of an extended XYZ file; the last one by default, if all are of as many disks."""
+def read_xyz(path: Path, frame: int) -> Disks:
+    """A frame of an extended XYZ file."""
     lines = lines_of(path)
     begin, count = block_of_frame(path, lines, 2, frame)
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}

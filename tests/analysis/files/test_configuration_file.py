@@ -1,9 +1,8 @@
-"""A run.h5 that holds a Configuration gives it back to the bit, or is refused."""
+"""A run.h5 that holds a Configuration gives it back to the bit."""
 
 import pytest
 from test_linearised_contacts import make
 
-from faultgouge.analysis import PackingFileError, RunFile
 from faultgouge.analysis.files.configuration_file import holds_configuration, read_configuration, write_configuration
 
 
@@ -17,9 +16,3 @@ def test_to_the_bit(d, tmp_path):
     assert found == snapshot
     assert found != make(d, slides=False)
     assert not found.position.flags.writeable
-
-
-def test_a_snapshot_is_no_run(tmp_path):
-    write_configuration(tmp_path / "run.h5", make(2))
-    with pytest.raises(PackingFileError, match=r"as LAMMPS left it, and no run .* spectrum, draw"):
-        RunFile(tmp_path / "run.h5")

@@ -2,6 +2,7 @@
 
 import re
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +13,8 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
-from faultgouge.analysis import Configuration, LinearisedContacts, Motion, fastest_growing
+from faultgouge.analysis import Configuration, Contacts, LinearisedContacts, Motion, fastest_growing
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.motion import linear as module
 from faultgouge.analysis.motion.certificate import NoProofError, prove
 from faultgouge.analysis.motion.eigenvalues import exponential
@@ -128,20 +128,6 @@ def turned_row(row):
     return derive_frozen(row, contacts=contacts, load=row.load @ q)
 
 
-def with_more(row, contacts, place, load):
-    """A packing with more contacts, each the first one but for what is given, and more particles, each the first."""
-    c, count = row.contacts, len(contacts["i"])
-    joined = {
-        name: np.concatenate([getattr(c, name), contacts.get(name, np.repeat(getattr(c, name)[:1], count, axis=0))])
-        for name in PER_CONTACT
-    }
-    each = {name: np.pad(getattr(row, name), (0, len(place)), "edge") for name in ("radius", "mass", "inertia")}
-    return Configuration(
-        dimension=row.dimension, position=np.vstack([row.position, place]), contacts=LinearisedContacts(**joined),
-        box=row.box, origin=row.origin, periodic=row.periodic, load=np.concatenate([row.load, load]), **each,
-    )  # fmt: skip
-
-
 STRONG, WEAK, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
 
 
@@ -160,13 +146,15 @@ def test_rate_of_a_packing_beyond_lapack_is_that_of_lapack(reference_packing, re
 
 def test_many_particles_alone_with_the_same_eigenvalues_hide_none(reference_packing, beyond_lapack):
     """Two hundred disks on a wall, none of which touches another: more equal eigenvalues than six vectors see."""
-    packing, count = dissipative(reference_packing(1.0), *WEAK).configuration, 200
-    alone = {"i": len(packing) + np.arange(count), "j": np.full(count, -1), "distance": np.full(count, np.inf)}
-    alone |= {"normal": np.tile([0.0, 1.0, 0.0], (count, 1)), "tangential_force": np.zeros((count, 3))}
-    load = np.zeros((count, 2, 3))
-    load[:, 0, 1] = -packing.contacts.normal_force[0]
-    both = packing, with_more(packing, alone, packing.position[:1].repeat(count, 0), load)
-    expected, found = (linear_verdict(Motion.of(each)) for each in both)
+    packing, count, n = reference_packing(1.0), 200, 100
+    place = np.tile([0.0, 0.5 - (packing.fy / packing.law.kn) ** (2 / 3)], (count, 1))
+    c, alone = packing.contacts, n + np.arange(count)
+    both = replace(
+        packing, position=np.vstack([packing.position, place]), radius=np.append(packing.radius, np.full(count, 0.5)),
+        contacts=Contacts(*np.hstack([(c.i, c.j), (alone, 0 * alone - 1)]), np.zeros(len(c) + count)),
+        top=np.append(packing.top, np.ones(count, bool)), mass=None, angle=None,
+    )  # fmt: skip
+    expected, found = (linear_verdict(Motion.of(dissipative(each, *WEAK))) for each in (packing, both))
     assert found.stable is expected.stable is True
     assert found.free == expected.free + count  # these roll
     assert found.growth_rate == pytest.approx(expected.growth_rate, abs=found.error + expected.error)
@@ -199,11 +187,13 @@ def test_motions_that_no_force_opposes_are_counted_and_no_growth(row, stable, fr
 def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
     """Two spheres beside three on a plane push each other apart by 1e-9 of the forces, and turn round each other: this
     motion has an eigenvalue of A below zero, and s next to the root of that."""
-    row, made = row_of_spheres(3, 0.0), []
-    for force in (1e-9, 1e-16):
-        pair = {"i": [4], "j": [3], "normal_force": [force], "friction": [0.5 * force]}
-        pair |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
-        made.append(with_more(row, pair, np.add(row.position[:2], [0.0, 5.0, 0.0]), np.zeros((2, 2, 3))))
+    row = row_of_spheres(5, 1.0)
+    c, load = row.contacts.chosen([3, 4, 5, 6]), row.load.copy()  # that of the last two, and three on the plane
+    load[3:] = 0.0
+    made = [
+        derive_frozen(row, contacts=derive_frozen(c, normal_force=force, friction=0.5 * force), load=load)
+        for force in np.array([[1e-9, 1.0, 1.0, 1.0], [1e-16, 1.0, 1.0, 1.0]])
+    ]
     found, expected = (linear_verdict(Motion.of(each)) for each in made)
     assert made[0].residual == pytest.approx(1e-9)
     assert 1e-6 < np.linalg.eigvals(Motion.of(made[0]).first_order).real.max() < 1e-4

@@ -29,9 +29,9 @@ def integrate(packing, velocity, step, count, rise=0.0):
     mass = np.outer([1.0, 1.0, packing.inertia_factor], packing.mass).T
     place, slip, speed = packing.position, c.slip, np.column_stack([velocity, np.zeros(n)])
 
-    def branch(place):
+    def contact(place):
         between = branches(place, packing.box_length, c.i, c.j)
-        return between, np.linalg.norm(between, axis=1)
+        return lengths_one(between), reach - np.linalg.norm(between, axis=1)
 
     def relative(moves):
         """Along x and y, and how far contacts roll."""
@@ -39,8 +39,8 @@ def integrate(packing, velocity, step, count, rise=0.0):
         return moves[c.i, :2] - other[:, :2], moves[c.i, 2] + other[:, 2]
 
     def forces(place, speed, slip):
-        between, distance = branch(place)
-        normal, overlap, (moves, rolls) = lengths_one(between), reach - distance, relative(speed)
+        normal, overlap = contact(place)
+        moves, rolls = relative(speed)
         power, bound = law.growth(overlap), law.mu * law.kn * overlap * law.growth(overlap)
         fn = law.kn * overlap * power - law.cn * power * np.sum(normal * moves, axis=1)
         rate = np.sum(turned(normal) * moves, axis=1) - rolls
@@ -54,13 +54,12 @@ def integrate(packing, velocity, step, count, rise=0.0):
     force = forces(place, speed, slip) - rest
     for k in range(count):
         speed = speed + 0.5 * step * force / mass
-        (a, r0), place = branch(place), place + step * speed[:, :2]
-        (b, r1), (moves, rolls) = branch(place), relative(step * speed)
-        middle = turned(0.5 * (a / r0[:, None] + b / r1[:, None]))
-        gain = np.sum(middle * moves, axis=1) - rolls
+        (before, less), place = contact(place), place + step * speed[:, :2]
+        (after, overlap), (moves, rolls) = contact(place), relative(step * speed)
+        gain = np.sum(turned(0.5 * (before + after)) * moves, axis=1) - rolls
         if law.rescales:
-            gain = gain - slip / (2 * (reach - r1)) * np.maximum(r0 - r1, 0.0)
-        slip = law.clamped(reach - r1, slip + gain)
+            gain = gain - slip / (2 * overlap) * np.maximum(overlap - less, 0.0)
+        slip = law.clamped(overlap, slip + gain)
         force = forces(place, speed, slip) - rest
         force[:, :2] += (k + 1) * step * rise
         speed = speed + 0.5 * step * force / mass

@@ -74,7 +74,6 @@ def test_a_packing_that_grows_says_where_its_first_contact_changes():
     told, risen = stability(pile), stability(pile, rise=np.tile([1.0, 0.0], (2, 1)))
     assert told.stable is risen.stable is False
     assert risen.sentences[-1] == "under a load that rises: not followed, since small motion grows"
-    json.dumps(risen.as_dict(), allow_nan=False)
     assert 0 < told.first_change**0.5 < 0.5
     assert f"the first contact changes at a displacement of {told.first_change**0.5:.2g} (root of D)" in str(told)
     ends = replace(told, follow={"displacement": 0.3, "ends": "flows"})
@@ -101,9 +100,8 @@ def test_a_rested_packing_holds_for_every_push_below_its_energy(path):
     assert "holds for every push of an energy up to" in str(told)
     system = OneSidedSystem.of(path(0.02))
     reach, z = reach_of(system), system.motion.first_order
-    assert np.isinf(reach.time)
+    assert (reach.time, system.motion.energy_norm.positive) == (np.inf, True)
     assert 1 < transient_gain(path(0.02), "energy").gain < reach.gain < 50
-    assert system.motion.energy_norm.positive
     step, state = expm(0.1 * z), np.random.default_rng(0).standard_normal((len(z), 40))
     first = np.sum(state**2, axis=0)
     for _ in range(25):

@@ -34,16 +34,15 @@ def test_a_packing_that_is_unstable_from_the_start(path, limits, of_lammps):
     equilibrium = (lambda fx: snapshot_of(path(fx))) if of_lammps else path
     onset = find_onset(equilibrium, loads, first=True, limits=limits)
     assert (onset.fx_c, onset.windows[0].kind) == (0.022, "start")
-    unstable = onset.as_dict()["unstable_at_start"]
-    assert (unstable["pairs"], unstable["negative"]) == (len(pairs), 0)
-    assert unstable["growth_rate"] == pytest.approx(max(pair.growth_rate for pair in pairs), rel=1e-9)
+    rate = pytest.approx(max(pair.growth_rate for pair in pairs), rel=1e-9)
+    assert onset.as_dict()["unstable_at_start"] == {"pairs": len(pairs), "negative": 0, "growth_rate": rate}
 
 
 def test_a_negative_eigenvalue_ends_the_branch(path):
     assert len(spectrum(buckled(path, 0.0219)).negative) > 0
     with pytest.raises(TurningPointError, match=r"before F_x = 0\.0218,"):
         find_onset(ending(path, 0.0218), [0.0216, 0.0217, 0.0218, 0.0219])
-    onset = find_onset(ending(path, 0.0222), [0.0217, 0.0219, 0.0222, 0.0223])
+    onset = find_onset(ending(path, 0.0222), [0.0218, 0.0219, 0.0222, 0.0223])
     assert onset.fx_c == pytest.approx(0.0218330564080, abs=1e-10)
     assert onset.as_dict()["branch_ends"] == 0.0222
 

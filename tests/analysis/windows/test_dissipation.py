@@ -5,6 +5,7 @@ import pytest
 from families import with_dissipation
 from linearised import motion_matrix
 from scipy.linalg import block_diag
+from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError
@@ -45,8 +46,6 @@ def crossing(half_width, place=0.4):
 @pytest.mark.parametrize("half_width", [0.2, 1e-2, 1e-3])
 def test_windows_narrower_than_the_increment(half_width, damping):
     """Both ends of the increment are stable; the edges are those of the block by itself."""
-    from scipy.optimize import brentq  # slow to import
-
     block = crossing(half_width)
     found = find_windows(family(block, damping), [-1.0, 0.0, 1.0, 2.0])
     if growth(block, damping, 0.4) < 0:
@@ -55,13 +54,13 @@ def test_windows_narrower_than_the_increment(half_width, damping):
         assert found == ()
         return
     (window,) = found
-    far = 0.4 + 13 * half_width * np.array([-1, 1])
-    edges = [brentq(lambda fx: growth(block, damping, fx), 0.4, end, xtol=1e-14) for end in far]
+    ends = 0.4 - 13 * half_width, 0.4 + 13 * half_width
+    edges = [brentq(lambda fx: growth(block, damping, fx), 0.4, end, xtol=1e-14) for end in ends]
     # Re s is known to 1e-15; its slope is the damping over the width, or one where the block is nearly defective
     digits = 1e-10 + 1e-14 * half_width / max(damping)
     assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=digits)
-    assert window.kind == "hopf"
     assert window.frequency == pytest.approx(np.sqrt(10), rel=0.1)
+    assert window.kind == "hopf"
     assert window.error < 10 * digits
 
 
@@ -75,9 +74,9 @@ def test_a_steady_loss_of_stability_is_no_hopf_point():
 
 
 def test_what_is_known_is_told_as_it_comes_and_what_grows_from_the_beginning():
-    told = list(Search(family(crossing(0.2), (1e-3, 1e-3)), 1e-7).along([-1.0, 0.0, 0.4, 1.0, 2.0]))
-    assert [fx for fx, _ in told] == [0.0, 0.4, 1.0, 2.0]
-    assert [[each.fx_end is None for each in windows] for _, windows in told] == [[], [True], [False], [False]]
+    told = Search(family(crossing(0.2), (1e-3, 1e-3)), 1e-7).along([-1.0, 0.0, 0.4, 1.0, 2.0])
+    open_ones = [(fx, [each.fx_end is None for each in windows]) for fx, windows in told]
+    assert open_ones == [(0.0, []), (0.4, [True]), (1.0, [False]), (2.0, [False])]
     (window,) = find_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
     assert (window.kind, window.fx_onset) == ("start", 0.0)
     assert 0.15 < window.fx_end < 0.25
@@ -92,9 +91,8 @@ def test_a_load_besides_that_has_no_equilibrium_costs_no_window():
             raise NoEquilibriumError("a gap", beyond=1.2)
         return pencil(fx)
 
-    found = find_windows(
-        with_a_gap, loads, look=lambda below, above: [{0.0: 0.4, 1.0: 1.5}[below]] if below >= 0 else []
-    )
+    beside = {0.0: [0.4], 1.0: [1.5]}  # where the search looks, too
+    found = find_windows(with_a_gap, loads, look=lambda below, above: beside.get(below, []))
     assert found == find_windows(pencil, loads, look=lambda below, above: [0.4] * (below == 0.0)) != ()
     with pytest.raises(NoEquilibriumError):
         find_windows(with_a_gap, [*loads[:3], 1.5, 2.0])
@@ -108,10 +106,7 @@ def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
     damped = with_dissipation(path, cn=cn)
     window = find_onset(damped, [0.0218, 0.0224], dissipation=True).windows[0]
-    assert window.fx_onset == pytest.approx(onset, abs=digits)
-    assert window.kind == "hopf"
-    below, above = (
-        np.linalg.eigvals(motion_matrix(damped(window.fx_onset + side))).real.max() for side in (-1e-9, 1e-9)
-    )
-    assert below < 0 < above
+    assert (window.fx_onset, window.kind) == (pytest.approx(onset, abs=digits), "hopf")
+    below, above = (motion_matrix(damped(window.fx_onset + side)) for side in (-1e-9, 1e-9))
+    assert np.linalg.eigvals(below).real.max() < 0 < np.linalg.eigvals(above).real.max()
     assert window.error < 1e-9

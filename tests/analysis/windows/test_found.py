@@ -24,26 +24,14 @@ class CutOffError(Exception):
     """The search ends here, as at a kill."""
 
 
-def counting(seen):
-    """A watch that takes down what is said of slices."""
-    return lambda says: seen.append(says) if says.endswith("modes") else None
-
-
 def files(folder):
     return sorted(folder.glob("*/*-*.npz"))
 
 
 def cut_off(search, slices, folder, others=()):
     """Have a search end, as at a kill, when so many slices are kept in a folder; their files."""
-    seen = []
-
-    def watch(says):
-        counting(seen)(says)
-        if len(seen) > slices:
-            raise CutOffError
-
     with pytest.raises(CutOffError):
-        search(watch=watch, folder=folder)
+        search([], slices, folder=folder)
     kept = [each for each in files(folder) if each not in others]
     assert len(kept) == slices
     return kept
@@ -56,7 +44,14 @@ def search(ramp):
     def make(mu=1.0):
         path = ramp(mu, 1e-3, 22)
 
-        def search(watch=None, **how):
+        def search(seen, slices=np.inf, **how):
+            """What is said of slices is taken down; the search ends when there are more than so many."""
+
+            def watch(says):
+                seen.extend([says] * says.endswith("modes"))
+                if len(seen) > slices:
+                    raise CutOffError
+
             with show_progress(watch):
                 found = SlicedSearch(lambda fx: System(fx, System.of(path(fx)).stiffness), limits=PASSING, **how)
                 return found.first_window(np.array(path.grid[20:]))
@@ -71,17 +66,17 @@ def search(ramp):
 def test_a_search_goes_on_to_the_bit(search, tmp_path, ranks):
     """On any number of ranks, but for what is damaged; then all is known. What was found for other operators stays."""
     all_said, said, nothing = [], [], []
-    expected = search()(watch=counting(all_said))
+    expected = search()(all_said)
     others = cut_off(search(0.8), 3, tmp_path)
     own = cut_off(search(), 5, tmp_path, others)
     own[0].write_bytes(own[0].read_bytes()[:200])
     own[1].write_bytes(b"PK\x03\x04")
-    for each in on_ranks(ranks, lambda mine: search()(watch=counting(said), ranks=mine, folder=tmp_path)):
+    for each in on_ranks(ranks, lambda mine: search()(said, ranks=mine, folder=tmp_path)):
         assert each.result() == expected
     assert len(said) == len(all_said) - 3
     assert set(others) < set(files(tmp_path))
     assert len(files(tmp_path)) == len(all_said) + 3
-    assert search()(watch=counting(nothing), folder=tmp_path) == expected
+    assert search()(nothing, folder=tmp_path) == expected
     assert nothing == []
 
 
@@ -92,7 +87,7 @@ def test_kept_slices_are_compared_with_the_others(search, tmp_path):
     beyond = last.border.beyond + last.border.spacing
     keep_result(kept[0].parent, last._replace(border=last.border._replace(beyond=beyond)))
     with pytest.raises(SliceError, match=rf"number {last.border.modes[1]} .* one is missing in between"):
-        search()(folder=tmp_path)
+        search()([], folder=tmp_path)
 
 
 @pytest.mark.slow
@@ -100,24 +95,19 @@ def test_a_folder_that_cannot_be_written_ends_the_search_at_once(search, tmp_pat
     (tmp_path / "occupied").touch()
     seen = []
     with pytest.raises(OutputError, match="cannot be made a folder"):
-        search()(watch=counting(seen), folder=tmp_path / "occupied")
+        search()(seen, folder=tmp_path / "occupied")
     assert seen == []
 
 
-def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
+@pytest.mark.parametrize(("error", "told"), [(OutputError, 0), (FaultgougeError, 1)])
+def test_an_error_that_ends_all_ranks_does_not_wait_for_them(error, told):
     def work():
-        raise OutputError("a full disk")
+        raise error("of this rank")
 
     gathered = []
-    with pytest.raises(OutputError, match="a full disk"):
-        Ranks(0, 2, gathered.append).together(work)
-    assert gathered == []
-
-    def raise_error():
-        raise FaultgougeError("of this rank")
-
-    with pytest.raises(FaultgougeError, match="of this rank"):
-        Ranks(0, 2, lambda mine: [mine, None]).together(raise_error)
+    with pytest.raises(error, match="of this rank"):
+        Ranks(0, 2, lambda mine: gathered.append(mine) or [mine, None]).together(work)
+    assert len(gathered) == told
 
 
 @settings(max_examples=60, deadline=None)

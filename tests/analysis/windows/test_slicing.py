@@ -1,7 +1,8 @@
 """All eigenvectors of a sparse symmetric matrix, slice by slice, against LAPACK."""
 
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from dataclasses import replace
+from itertools import chain
 from threading import Barrier
 
 import numpy as np
@@ -13,6 +14,10 @@ from faultgouge.analysis.windows import LIMITS, Limits, Ranks
 from faultgouge.analysis.windows.slices import slices
 
 FEW = Limits(slice_size=24, count_spacing=60, first_look=20, one_basis=50)
+
+
+SLICED = replace(LIMITS, one_basis=50)
+"""Slices of the sizes of packings, of far smaller matrices."""
 
 
 def network(size, seed):
@@ -30,19 +35,17 @@ def test_slices_are_the_whole_spectrum():
     expected, basis = np.linalg.eigh(matrix.toarray())
     values, count = [], 0
     for part in slices(matrix, 20, ranks=Ranks(workers=2)):
-        own = part.values[part.own]
+        own, vectors = part.values[part.own], part.vectors
         assert part.first + part.own.start == count
         count += len(own)
         values.append(own)
         assert part.own.start == min(20, part.first + part.own.start)
-        vectors = part.vectors
         # what blocks stray is taken away but for its square, 1e-11 at the most for one vector
         np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(part.values)), rtol=0, atol=2e-11)
         # in mean distances of eigenvalues, 8 / 1156: the residual that is asked for, and its square
-        spacing = np.ptp(own) / len(own)
         residual = np.linalg.norm(matrix @ vectors - vectors * part.values, axis=0)[part.own]
         overlap = np.linalg.norm(basis[:, count - len(own) : count].T @ vectors[:, part.own], axis=0)
-        assert residual.max() < 10 * LIMITS.vector_residual * spacing
+        assert residual.max() < 10 * LIMITS.vector_residual * np.ptp(own) / len(own)
         np.testing.assert_allclose(overlap, 1.0, atol=1e-3)
     # the residual squared over the distance of the next eigenvalues, which may be a hundredth of the mean one
     np.testing.assert_allclose(np.concatenate(values), expected, atol=1e-4 * 8 / 1156)
@@ -51,20 +54,19 @@ def test_slices_are_the_whole_spectrum():
 @pytest.mark.slow
 def test_a_negative_eigenvalue_is_found_with_those_next_to_zero():
     """As of a symmetric part that is about to lose its stability; the bound of the spectrum is far away."""
-    expected = np.concatenate([[-1.3], np.linspace(1, 2000, 1250), np.geomspace(3e3, 1e5, 50)])
-    values = np.concatenate([part.values[part.own] for part in slices(csc_array(np.diag(expected)), 20)])
-    np.testing.assert_allclose(values[:300], expected[:300], rtol=0, atol=1e-4 * 2000 / 1250)
+    expected = np.concatenate([[-1.3], np.linspace(1, 2000, 600), np.geomspace(3e3, 1e5, 50)])
+    values = np.concatenate([part.values[part.own] for part in slices(csc_array(np.diag(expected)), 20, SLICED)])
+    np.testing.assert_allclose(values[:300], expected[:300], rtol=0, atol=1e-4 * 2000 / 600)
 
 
 @pytest.mark.slow
 def test_degenerate_eigenvalues_are_all_found():
     """A square lattice on a torus, stiffer along one side: most eigenvalues are fourfold."""
-    along = 2 * np.eye(34) - np.roll(np.eye(34), 1, axis=0) - np.roll(np.eye(34), -1, axis=0)
-    matrix = csc_array(np.kron(along, np.eye(34)) + np.kron(np.eye(34), 1.3 * along))
-    one = np.linalg.eigvalsh(along)
-    expected = np.sort(np.add.outer(one, 1.3 * one).ravel())
-    values = np.concatenate([part.values[part.own] for part in slices(matrix, 20)])
-    np.testing.assert_allclose(values, expected, rtol=0, atol=1e-6)
+    one = np.eye(24)
+    along = 2 * one - np.roll(one, 1, axis=0) - np.roll(one, -1, axis=0)
+    matrix, values = csc_array(np.kron(along, one) + np.kron(one, 1.3 * along)), np.linalg.eigvalsh(along)
+    found = np.concatenate([part.values[part.own] for part in slices(matrix, 20, SLICED)])
+    np.testing.assert_allclose(found, np.sort(np.add.outer(values, 1.3 * values).ravel()), rtol=0, atol=1e-6)
 
 
 def overlooking(matrix, shift):
@@ -74,8 +76,8 @@ def overlooking(matrix, shift):
 
 
 def inaccurate(matrix, shift):
-    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
-    return factor_shifted(csc_array(matrix * (1 + 2e-4)), shift)
+    """Factors of a matrix that is off by 4e-4: half of a mean distance of eigenvalues at their upper end."""
+    return factor_shifted(csc_array(matrix * (1 + 4e-4)), shift)
 
 
 @pytest.mark.slow
@@ -84,15 +86,14 @@ def inaccurate(matrix, shift):
 )
 def test_wrong_factors_are_noticed(factorise, says):
     with pytest.raises(SliceError, match=says):
-        list(slices(network(34, 2), 20, factorise=factorise))
+        list(slices(network(24, 2), 20, SLICED, factorise=factorise))
 
 
 @pytest.mark.parametrize("distance", [1e-6, -1e-8])
 def test_shift_next_to_an_eigenvalue(distance):
     """Such an eigenvector grows back from rounding at once; blocks that stray with it are made anew."""
     values, own = np.linspace(1.0, 2.0, 301), (138, 162)
-    spectrum = SlicedSpectrum(csc_array(np.diag(values)), FEW, factor_shifted)
-    part = spectrum.slice_about(values[150] + distance, own, 10)
+    part = SlicedSpectrum(csc_array(np.diag(values)), FEW, factor_shifted).slice_about(values[150] + distance, own, 10)
     # ten vectors that stray together, each by 3e-6 at the most
     assert np.abs(part.vectors.T @ part.vectors - np.eye(len(part.values))).max() < 1e-10
     np.testing.assert_allclose(part.values[part.own], values[slice(*own)], rtol=0, atol=1e-4 / 300)
@@ -122,24 +123,23 @@ def test_ranks_have_together_the_slices_of_one_to_the_bit(size):
     alone = list(slices(matrix, 10, limits=FEW))
     shared = [each.result() for each in on_ranks(size, lambda ranks: list(slices(matrix, 10, limits=FEW, ranks=ranks)))]
     assert min(len(each) for each in shared) >= len(alone) // size > 1
-    for one, other in zip(alone, (part for each in shared for part in each), strict=True):
+    for one, other in zip(alone, chain(*shared), strict=True):
         assert (one.first, one.own) == (other.first, other.own)
         assert np.array_equal(one.values, other.values)
         assert np.array_equal(one.vectors, other.vectors)
 
 
-def of_second_rank(rank, matrix, shift, fails):
-    """What the second of two ranks finds: an error, or inertias that are too high by one."""
-    if fails and shift > 6 and rank == 1:
-        raise SliceError("of one rank")
-    solve, below = factor_shifted(matrix, shift)
-    return solve, below + rank * (not fails)
-
-
 @pytest.mark.parametrize(("fails", "says"), [(True, "of one rank"), (False, "is missing in between")])
 def test_an_error_of_one_rank_is_that_of_all(fails, says):
+    """The second of two ranks has an error, or inertias that are too high by one."""
+
     def of(ranks):
-        factorise = partial(of_second_rank, ranks.rank, fails=fails)
+        def factorise(matrix, shift):
+            if fails and shift > 6 and ranks.rank == 1:
+                raise SliceError("of one rank")
+            solve, below = factor_shifted(matrix, shift)
+            return solve, below + ranks.rank * (not fails)
+
         return list(slices(network(20, 5), 10, limits=FEW, factorise=factorise, ranks=ranks))
 
     for each in on_ranks(2, of):

@@ -2,26 +2,16 @@
 
 import pickle
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from families import DIGITS, OTHERS, crossing, embedded, normal_form, then_jumping
+from scipy.linalg import block_diag
 
 from faultgouge.analysis import Contacts, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.uncertain_digits import with_uncertainty
 from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing
-from faultgouge.analysis.windows.pair_over_load import Plane
-
-
-@pytest.mark.parametrize("d", [0.01, 0.3])
-@pytest.mark.parametrize("points", [2, 5, 40])
-def test_normal_form(d, points):
-    (window,) = complex_windows(normal_form(d), np.linspace(0, 2.2 * d, points))
-    assert window.kind == "coalescence"
-    assert window.fx_onset == pytest.approx(d, abs=DIGITS)
-    assert window.fx_end is None
-    assert window.eigenvalue == pytest.approx(1, abs=DIGITS)
-    assert window.error < DIGITS
 
 
 def bent(f):
@@ -59,6 +49,7 @@ def with_a_hole(low, high):
         (with_a_hole(0.49, 0.51), [0.0, 1.0], [(0.3, 0.7)]),
         *((crossing(0.37, product), np.linspace(0, 1, 4), []) for product in (0.0, 1e-12, 1e-4, 0.3)),
         (then_jumping, [0.0, 0.5, 1.0, 1.5], [(0.5, 0.7), (1.1, 1.4)]),
+        *((normal_form(d), np.linspace(0, 2.2 * d, n), [(d, np.inf)]) for d, n in product((0.01, 0.3), (2, 5, 40))),
     ],
 )
 def test_windows_that_are_known(operator, loads, edges):
@@ -66,6 +57,7 @@ def test_windows_that_are_known(operator, loads, edges):
     ends = [(each.fx_onset, np.inf if each.fx_end is None else each.fx_end) for each in found]
     assert np.ravel(ends) == pytest.approx(np.ravel(edges), abs=1e-8 if operator is then_jumping else DIGITS)
     assert all((each.kind == "start") == (each.fx_onset == 0.0) for each in found)
+    assert operator is then_jumping or all(each.error < DIGITS for each in found)
 
 
 @pytest.mark.parametrize(
@@ -99,8 +91,7 @@ def test_window_narrower_than_the_increment(half_width, place):
     """
 
     def operator(f):
-        turn = np.eye(15)
-        turn[1:3, 1:3] = [[np.cos(f), np.sin(f)], [-np.sin(f), np.cos(f)]]
+        turn = block_diag(1, [[np.cos(f), np.sin(f)], [-np.sin(f), np.cos(f)]], np.eye(12))
         bent = crossing(place, -(half_width**2))(np.sin(f) + place - np.sin(place))
         return turn.T @ bent @ turn
 
@@ -117,13 +108,12 @@ def test_noise_loses_its_imaginary_part():
     for seed in range(20):
         rng = np.random.default_rng(seed)
         basis = np.linalg.qr(rng.normal(size=(12, 12)))[0]
-        inner = np.diag(np.concatenate([[5.0, 5.0], OTHERS]))
-        inner[0, 1] = 1.0
-        matrix = basis @ inner @ basis.T
-        split += np.iscomplex(np.linalg.eigvals(matrix)).any()
-        assert not Motions.of(System(0.0, matrix)).grows.any()
-        inner[1, 0] = -1e-8  # imaginary parts of 1e-4
-        assert Motions.of(System(0.0, basis @ inner @ basis.T)).grows.sum() == 1
+        noisy, paired = (np.diag(np.concatenate([[5.0, 5.0], OTHERS])) for _ in range(2))
+        noisy[0, 1] = paired[0, 1] = 1.0
+        paired[1, 0] = -1e-8  # imaginary parts of 1e-4
+        split += np.iscomplex(np.linalg.eigvals(basis @ noisy @ basis.T)).any()
+        grows = [Motions.of(System(0.0, basis @ each @ basis.T)).grows.sum() for each in (noisy, paired)]
+        assert grows == [0, 1]
     assert split > 0
 
 
@@ -134,18 +124,6 @@ def test_no_onset_is_said_so(path, disks):
         find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
     found = pickle.loads(pickle.dumps(NoGrowthError("Nothing grows", "raise the largest load", finer=True)))
     assert str(found) == "Nothing grows: take smaller increments, or raise the largest load."
-
-
-def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
-    """A level mixes with one direction of the pair's plane; the nearest two are still conjugates."""
-    operator = np.diag([2.0, 2.0, 2.1, 5.0])
-    operator[0, 1], operator[1, 0] = 1.0, -1.0
-    modes = Motions.of(System(0.0, operator))
-    pair = Plane.of(modes, np.flatnonzero(modes.grows))
-    turn, angle = np.eye(4), np.radians(65)
-    turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    turned = Motions.of(System(1.0, turn @ operator @ turn.T))
-    assert pair.closest(turned) == np.flatnonzero(turned.grows).tolist()
 
 
 @pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])
@@ -182,38 +160,37 @@ def test_what_is_out_of_balance_is_part_of_the_error(path):
 def test_contacts_without_force_are_left_out(reference_packing):
     """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
     packing = reference_packing(1.0)
-    contacts, rattler, position = packing.contacts, packing.rattlers[0], packing.position.copy()
+    c, rattler, position = packing.contacts, packing.rattlers[0], packing.position.copy()
     apart = position[rattler] - position
     gap = np.hypot(*apart.T) - packing.radius - packing.radius[rattler]
     gap[packing.rattlers] = np.inf
     neighbour = int(np.argmin(gap))
     position[rattler] -= (gap[neighbour] + 1e-12) * apart[neighbour] / np.hypot(*apart[neighbour])
-    more = Contacts(np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0))
+    more = Contacts([*c.i, rattler], [*c.j, neighbour], [*c.slip, 0.0])
     touching = replace(packing, position=position, contacts=more)
     assert len(touching.rattlers) == len(packing.rattlers) - 1
     assert touching.residual == packing.residual
-    assert len(force_bearing(touching).contacts) == len(contacts)
+    assert len(force_bearing(touching).contacts) == len(c)
     assert abs(System.of(touching).stiffness - System.of(packing).stiffness).max() == 0
     # not so where the balance is bad because the packing is none
     moves = force_bearing(replace(touching, fx=1.0))
     assert moves.residual > 0.1
-    assert len(moves.contacts) >= len(contacts)
+    assert len(moves.contacts) >= len(c)
 
 
 def test_a_load_without_equilibrium_at_an_edge_is_gone_around():
     """The edge is known to about the width of the hole."""
     (window,) = complex_windows(with_a_hole(0.299, 0.301), [0.0, 1.0])
-    assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
-    assert window.error <= 2e-3
+    assert abs(window.fx_onset - 0.3) <= window.error + DIGITS < 2e-3 + 2 * DIGITS
     assert window.fx_end == pytest.approx(0.7, abs=DIGITS)
 
 
 def test_the_first_window_alone_is_that_of_all_and_nothing_beyond_it_is_asked_for(path):
-    every, asked = find_onset(path, path.grid[18:]), []
+    every, asked = find_onset(path, path.grid[20:]), []
     written = with_uncertainty(every.fx_c, every.error)
     assert repr(every).startswith(f"<Onset: F_x^c = {written}, ")
     assert f"from {written}</th>" in every._repr_html_()
-    first = find_onset(lambda fx: asked.append(fx) or path(fx), path.grid[18:], first=True)
+    first = find_onset(lambda fx: asked.append(fx) or path(fx), path.grid[20:], first=True)
     assert first.fx_c == pytest.approx(every.fx_c, abs=first.error + every.error)
     assert len(first.windows) == 1
     assert max(asked) == min(fx for fx in path.grid if fx > first.fx_c)

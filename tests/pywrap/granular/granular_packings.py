@@ -17,10 +17,13 @@ ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
-def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3, units: str = "lj") -> str:
+DECKS = Path(__file__).parent / "decks"
+
+
+def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3) -> str:
     """The first commands of a deck: spheres, or disks, in a box."""
     return f"""
-units {units}
+units lj
 dimension {dimension}
 atom_style sphere
 boundary {boundary}
@@ -34,15 +37,15 @@ create_box {kinds} box
 def deck(
     places, law: str, wall: str = "", *, box: str = "block -4 4 -4 4 -2 8", boundary: str = "f f f", dimension: int = 3,
     kinds=(), diameters=(1.0,), load: str = "0 0 -1", more: str = "fix move all nve/sphere", timestep: float = 1e-3,
-    run: str = "run 0", units: str = "lj", fill: str = "", density: str = "density 1.0",
+    run: str = "run 0", fill: str = "",
 ) -> str:  # fmt: skip
     """Particles at some places, or by the commands of `fill`, with one law for pairs and for the plane of a wall, as a
     wall names it."""
     granular, placed = law.startswith("granular "), zip(kinds or [1] * len(places), places, strict=True)
     return "\n".join([
-        head(box, boundary, kinds=len(diameters), dimension=dimension, units=units), fill,
+        head(box, boundary, kinds=len(diameters), dimension=dimension), fill,
         *(f"create_atoms {k} single {x:.17g} {y:.17g} {z:.17g} units box" for k, (x, y, z) in placed),
-        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), f"set group all {density}",
+        *(f"set type {k} diameter {d}" for k, d in enumerate(diameters, 1)), "set group all density 1.0",
         "pair_style granular" if granular else f"pair_style gran/{law}",
         f"pair_coeff * * {law.removeprefix('granular ') if granular else ''}",
         f"fix floor all wall/gran {law} {wall}" if wall else "",
@@ -52,27 +55,16 @@ def deck(
     ])  # fmt: skip
 
 
-TWO = (
-    head("block -4 4 -4 4 0 8")
-    + """
-create_atoms 1 single 0 0 0.495 units box
-create_atoms 1 single 0 0.6 1.275 units box
-set group all diameter 1.0 density 1
-thermo_style custom step
-"""
-)
+TWO = (DECKS / "two.in").read_text()
 MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 
 
 def instance(log=None):
     """LAMMPS on the ranks of this process, with the plugin."""
-    from faultgouge.pywrap import Engine  # loads what is needed, in order
-
-    assert Engine
     from mpi4py import MPI
 
-    from faultgouge.pywrap.lammps.instance import lammps_instance
+    from faultgouge.pywrap import lammps_instance
 
     return lammps_instance(MPI.COMM_WORLD, log)
 
@@ -98,8 +90,7 @@ def start(lmp, d: int, count: int) -> None:
     across = int(width // 1.05)
     layer = across ** (d - 1)
     for k in range(count):
-        a, b = k % layer % across, k % layer // across
-        x, y = (np.array([a, b]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
+        x, y = (np.array([k % layer % across, k % layer // across]) + 0.5) * width / across + rng.uniform(-0.1, 0.1, 2)
         height = 0.55 + 1.02 * (k // layer)
         place = (x, y, height) if d == 3 else (x, height, 0.0)
         lmp.command(f"create_atoms {1 + k % 2} single {' '.join(f'{p:.17g}' for p in place)} units box")

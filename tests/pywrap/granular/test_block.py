@@ -3,32 +3,20 @@ sphere it slides down faster and faster."""
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, of_particle, refused
+from granular_packings import command, of_particle, refused
 from pushes import PUSH, in_a_quiet_copy
 
 import faultgouge
 from faultgouge.analysis import one_sided_motion, stability
 
 FRICTION = 0.5
-LAW = f"hooke 1e3 5 tangential linear_history 300 1.0 {FRICTION} damping velocity"
-BLOCK = deck(
-    [(0, 0, 0.4995)], f"granular {LAW}", "zplane 0 NULL contacts", boundary="p p f", run="run 5000",
-    more="variable pull equal mass(all)*v_slope\nfix pull all addforce v_pull 0 0\nfix drag all viscous 5.0\n"
-    "fix move all nve/limit 0.1",
-)  # fmt: skip
-"""A sphere that does not turn."""
 
 
 @pytest.fixture
-def block(lammps_with):
-    """Makes a block at rest on a slope, by a share of the angle of repose, to first order in the share; and its
-    configuration."""
-
-    def make(share: float):
-        lmp = lammps_with(f"variable slope equal {share * FRICTION:.17g}\n{BLOCK}")
-        return lmp, faultgouge.from_lammps(lmp)
-
-    return make
+def block(taken):
+    """Makes a sphere that does not turn at rest on a slope, by a share of the angle of repose, to first order in the
+    share; and its configuration."""
+    return lambda share: taken(f"variable slope equal {share * FRICTION:.17g}", "block.in")
 
 
 def moved(lmp, velocity: float, steps: int, which: int = 1) -> float:
@@ -125,43 +113,26 @@ def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
         block(1.0 + 4e-6)
 
 
-SPHERE = np.pi / 6
-UNEQUAL = deck(
-    [(-1, 0, 0.5 - SPHERE / 1e3), (1, 0, 0.05 - 1e-3 * SPHERE / 1e3)], f"granular {LAW}", "zplane 0 NULL contacts",
-    boundary="p p f", kinds=(1, 2), diameters=(1.0, 0.1),
-)  # fmt: skip
-"""A sphere, and one of a thousandth of its mass."""
-
-
 @pytest.mark.parametrize(("which", "named"), [(1, True), (2, False)])
 def test_the_mass_of_what_moves_decides_whether_its_velocity_is_named(lammps_with, which, named):
     """A velocity of 2e-5 becomes a force of 2e-5 (k m)^(1/2): 17e-4 of the mean force, or 0.5e-4; 1e-4 may be left."""
-    lmp = lammps_with(UNEQUAL)
+    lmp = lammps_with(deck="unequal.in")
     of_particle(lmp, "v", which)[1] = 2e-5
     assert ("particles move by up to 2e-05 " in str(faultgouge.from_lammps(lmp).remarks)) is named
 
-
-HILL = deck(
-    [(0, 0, 0.5), (0, 0, 1.4995)], f"granular {LAW}", kinds=(1, 2), diameters=(1.0, 1.0), load="",
-    more="group block type 2\nfix load block gravity 1.0 vector 0 0 -1\nfix drag block viscous 10.0\n"
-    "fix move block nve\nvariable pull equal mass(block)*v_slope*(1-exp(-0.5*step*dt))\n"
-    "fix pull block addforce v_pull 0 0",
-    run="run 20000\nunfix pull\nfix pull block addforce $(mass(block)*v_slope) 0 0\nrun 5000",
-)  # fmt: skip
-"""A sphere that does not turn, on top of another one, and pulled sideways until it nearly slides."""
 
 REPOSE = 0.9978189798742391 * FRICTION
 """The pull over the weight at which the contact lacks 9e-8 of Coulomb's bound: the pull moves the block, and turns the
 contact."""
 
 
-def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(lammps_with):
+def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(taken):
     """Ahead it slides with s^2 = (1 + mu^2) g / r for the distance r of the centres, or not at all.
 
     The torque does not turn it. The weight is g, and the pull mu g: as the contact turns by a, the force along it grows
     by (1 + mu^2) g a."""
-    lmp = lammps_with(f"variable slope equal {REPOSE:.17g}\n{HILL}")
-    verdict = stability(here := faultgouge.from_lammps(lmp))
+    lmp, here = taken(f"variable slope equal {REPOSE:.17g}", "hill.in")
+    verdict = stability(here)
     assert (verdict.stable, verdict.at_bound) == (False, 1)
     assert verdict.growth_rate == pytest.approx(2 * (1 + FRICTION**2) ** 0.5, rel=1e-3)  # r is shorter by the overlap
     motion = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0])

@@ -50,7 +50,7 @@ def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path, more):
     (tmp_path / "deck.in").write_text("\n".join([f"log {tmp_path}/own.log", told[0], *told[2:], more, ""]))
     lmp.file(str(tmp_path / "deck.in"))
     # one text is as good as many lines, and a comment is none of the command
-    text = "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"])
+    text = "\n".join(told) + "  # ${comment}"
     found, other, same = (faultgouge.from_lammps(lmp, each, balance=np.inf) for each in (None, told, text))
     assert found == other == same
     assert found.free.all()  # by fix move

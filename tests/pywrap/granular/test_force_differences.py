@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, agree, command, deck, instance, is_proved, refused
+from granular_packings import DECKS, LAWS, agree, command, deck, instance, is_proved, refused
 from pushes import moves_alike
 from scipy.spatial import cKDTree
 
@@ -15,10 +15,10 @@ from faultgouge.analysis.files.configuration_file import read_configuration, wri
 @pytest.mark.long
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("law", LAWS)
-def test_measured_laws_and_differences_agree(beds, law, d):
+def test_measured_laws_and_differences_agree(bed, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
-    lmp = beds(law, d)
-    laws, found = (faultgouge.from_lammps(lmp, differences=each) for each in (False, True))
+    lmp, laws = bed(law, d)
+    found = faultgouge.from_lammps(lmp, differences=True)
     assert (laws.operators, found.operators) == ("laws", "differences")
     assert not laws.contacts.at_bound.any()
     agree(found, laws)
@@ -32,17 +32,9 @@ def test_measured_laws_and_differences_agree(beds, law, d):
     assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
 
 
-def test_a_contact_at_the_bound_is_seen(lammps_with):
+def test_a_contact_at_the_bound_is_seen(taken):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
-    lmp = lammps_with(deck(
-        [(0, 0, 0), (0.99, 0, 0), (-0.99, 0, 0)], "hooke/history 1e4 4e3 0 0 0.5 1", box="block -4 4 -4 4 -0.5 0.5",
-        boundary="f f p", dimension=2, load="", run="",
-    ))  # fmt: skip
-    # particle 2 slides past the first, and is at the bound with it
-    lmp.numpy.extract_atom("v")[1, 1] = 100.0
-    command(lmp, "unfix move\nfix slow all nve/noforce\nrun 1 post no\nunfix slow\nvelocity all set 0 0 0")
-    lmp.command("fix move all nve/sphere")
-    exact = faultgouge.from_lammps(lmp, balance=np.inf)
+    lmp, exact = taken("", "passing.in", balance=np.inf)
     assert exact.contacts.at_bound.sum() == 1
     found = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)
     assert set(found.ids[found.one_sided_particles]) == {1, 2}
@@ -79,13 +71,12 @@ def test_dashpots_of_frozen_particles_and_weak_contacts_among_strong_ones(lammps
 
 
 @pytest.mark.parametrize("gap", [1e-13, 1e-5])
-def test_particles_that_nearly_touch(lammps_with, gap):
+def test_particles_that_nearly_touch(taken, gap):
     """LAMMPS's compute pair/local says nothing of them, and one that is displaced may feel the other one.
 
     A displacement is far longer than one of the gaps, and far shorter than the other.
     """
-    lmp = lammps_with(row((-1.5, 0), (0, 0), (1 + gap, 0)))
-    found = faultgouge.from_lammps(lmp, differences=True, balance=np.inf)
+    lmp, found = taken(row((-1.5, 0), (0, 0), (1 + gap, 0)), differences=True, balance=np.inf)
     laws = faultgouge.from_lammps(lmp, prove=False, balance=np.inf)
     assert len(found.contacts) == 0
     assert found.operator_error < 1e-5
@@ -105,15 +96,12 @@ def in_a_box(*places, down: str) -> str:
 
 
 @pytest.mark.parametrize("kisses", [False, True])
-def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
+def test_spheres_in_an_edge_and_in_a_corner_of_a_region(taken, kisses):
     """With friction at two and three faces; or at a face that bears nothing, which is about to open."""
     places = [(-5.5, -5.5, -5.5), (-4.5, -5.5, -5.5)]
-    lmp = lammps_with(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
-    found = faultgouge.from_lammps(lmp)
-    # where it kisses the face nothing presses the sphere along x
-    assert (list(found.ids[found.one_sided_particles]), stability(found).stable) == (
-        ([1], None) if kisses else ([], True)
-    )
+    _, found = taken(in_a_box(*places[: 2 - kisses], down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
+    one_sided, stable = ([1], None) if kisses else ([], True)  # nothing presses a sphere along x that kisses the face
+    assert (list(found.ids[found.one_sided_particles]), stability(found).stable) == (one_sided, stable)
     if not kisses:
         is_proved(found, "differences")
         assert found.operator_error < 1e-6
@@ -126,9 +114,7 @@ def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
     assert found.wall_force == pytest.approx(weight, rel=1e-3)
     contacts = derive_frozen(found.contacts, normal_force=np.full(len(found.contacts), 1e-6 * weight))
     feeble = derive_frozen(found, contacts=contacts)
-    says = (
-        "the packing moves: the residual force on a particle is 0.00524, the largest force of a contact or a wall 0.52"
-    )
+    says = "the packing moves: the residual force on a particle is 0.00524, the largest force of a contact or a wall"
     for share, moves in ((1e-5, False), (1e-2, True)):
         load = feeble.load - feeble.net_force
         load[0, 0, 0] += share * weight
@@ -136,19 +122,14 @@ def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
 
 
 @pytest.mark.long
-def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
+def test_forces_that_depend_on_all_contacts_of_a_particle(taken):
     """In a die the model mdr has a particle's volume resist: its neighbours feel one another through it."""
-    model = "granular mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
-    die = f"region die block -3 3 -3 3 0 3.86 units box\nfix die all wall/gran/region {model} region die\n"
-    die += "fix move all nve\nfix hold all setforce 0.0 0.0 NULL\nfix drag all viscous 5"
-    places = [(0, 0, 0.49 + 0.96 * k) for k in range(4)]
-    found = faultgouge.from_lammps(lammps_with(deck(places, model, load="", more=die, run="run 20000")))
+    _, found = taken("", "die.in")
     assert found.operator_error < 1e-5
     assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in long steps, 3e-5 in short ones
     along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
-    far = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
-    assert along[far == 2].min() > 0.01 * along.max()
-    assert along[far == 3].max() == 0.0
+    assert min(along.diagonal(2).min(), along.diagonal(-2).min()) > 0.01 * along.max()
+    assert along[0, 3] == along[3, 0] == 0.0
 
 
 def test_particles_far_apart_that_something_couples(lammps_with):
@@ -163,14 +144,8 @@ def test_particles_far_apart_that_something_couples(lammps_with):
 def cone(request, tmp_path_factory):
     """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     lmp = instance(tmp_path_factory.mktemp("cone") / "log.lammps")
-    model = "granular jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
-    pour = "region pour cylinder z 0 0 2.4 9.5 24 units box\ncreate_atoms 1 random"
-    walls = f"region cone cone z 0 0 0.6 8 0 25 side in units box\nfix cone all wall/gran/region {model} region cone"
-    command(lmp, deck(
-        [], model, box="block -9 9 -9 9 -1 26", units="si", timestep=5e-4, run="run 20000",
-        fill=f"{pour} {request.param} 4711 pour overlap 0.9 maxtry 2000\nneighbor 0.1 bin",
-        more=f"{walls}\nfix move all nve/sphere\nfix drag all viscous 0.5",
-    ))  # fmt: skip
+    lmp.command(f"variable count equal {request.param}")
+    lmp.file(str(DECKS / "cone.in"))
     faultgouge.relax(lmp)
     yield lmp, faultgouge.from_lammps(lmp)
     lmp.close()

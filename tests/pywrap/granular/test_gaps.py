@@ -2,46 +2,38 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, of_particle
+from granular_packings import command, of_particle
 
-import faultgouge
 from faultgouge.analysis import one_sided_motion, stability
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.operators.gaps import gaps_of
 
 GAP = 1e-6
-LAW = "hooke 1e3 5 tangential linear_history 300 1.0 0.5 damping velocity"
-ROW = deck(
-    [(-0.5, 0.4995, 0), (0.5 + GAP, 0.4995, 0), (1.5 + 2.5 * GAP, 0.4995, 0)], f"granular {LAW}",
-    "yplane 0 NULL contacts", box=f"prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0", boundary="p f p", dimension=2,
-    load="0 -1 0", more="fix drag all viscous 3.0\nfix move all nve", run="run 5000\nunfix drag",
-)  # fmt: skip
-"""Three disks that do not turn, side by side, the last beside the first: gaps of 1, 1.5 and 0.5."""
 
 
 @pytest.fixture
-def row(lammps_with):
-    lmp = lammps_with(ROW)
-    return lmp, faultgouge.from_lammps(lmp)
+def row(taken):
+    """Three disks that do not turn, side by side, the last beside the first: gaps of 1, 1.5 and 0.5."""
+    return taken("", "gaps.in")
 
 
 def test_gaps_are_those_of_the_row(row):
     _, here = row
     found = gaps_of(here)
-    gaps = {tuple(sorted((int(i), int(j)))): gap for i, j, gap in zip(found.i, found.j, found.gap, strict=True)}
+    gaps = {(min(i, j), max(i, j)): gap for i, j, gap in zip(found.i, found.j, found.gap, strict=True)}
     assert gaps == pytest.approx({(0, 1): GAP, (1, 2): 1.5 * GAP, (0, 2): 0.5 * GAP}, rel=1e-6)
     moved = 1e-8 * np.random.default_rng(0).standard_normal(here.coordinates)
     after = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
     np.testing.assert_allclose(found.gap - after.gap, found.rates(here) @ moved, atol=1e-14)
-    moved[:] = 0.9 * here.contacts.overlap.max() * (np.arange(here.coordinates) == 1)  # x of the second
-    apart = gaps_of(derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T))
-    assert apart.gap.max() == pytest.approx(moved.max() + GAP, rel=1e-6)
+    away = 0.9 * here.contacts.overlap.max()  # along x, of the second
+    apart = gaps_of(derive_frozen(here, position=here.position + np.outer([0, 1, 0], [away, 0])))
+    assert apart.gap.max() == pytest.approx(away + GAP, rel=1e-6)
 
 
 def test_a_push_that_closes_a_gap_is_too_large(row):
     """LAMMPS's second disk stays where it is after half of the largest push, and is hit after twice that push."""
     lmp, here = row
-    velocity = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    velocity = np.outer([1, 0, 0], [1.0, 0.0])
     motion = one_sided_motion(here, velocity, times=np.linspace(0.01, 0.5, 50))
     most = motion.scales[1]
     # close looks take steps of 0.3 of the stable one
@@ -53,7 +45,7 @@ def test_a_push_that_closes_a_gap_is_too_large(row):
     rise = stability(here, rise=velocity).rising  # against the spring of the floor
     assert (rise["next_event"], rise["next_change"]) == ("closes", pytest.approx(300 * GAP, rel=1e-3))
     for size, hit in ((0.5, False), (2.0, True)):
-        command(lmp, "velocity all set 0 0 0")
+        lmp.command("velocity all set 0 0 0")
         before = of_particle(lmp, "x", 2)[0]
         of_particle(lmp, "v", 1)[0] = size * most
         command(lmp, "run 200 post no")

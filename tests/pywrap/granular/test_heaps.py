@@ -6,7 +6,7 @@ apart. Its torque R n x f has a spring and a dashpot of the relative rotation, a
 
 import numpy as np
 import pytest
-from granular_packings import MOVES, agree, command, deck, is_proved
+from granular_packings import MOVES, agree, command, is_proved
 from pushes import in_steps, pushed
 
 import faultgouge
@@ -23,16 +23,8 @@ def heap(lammps_with):
 
     def make(law: str, mu: float, damped: bool, seed: int, count: int):
         model, wall = (MODEL.format(*each, law=law, mu=mu) for each in (DAMPED, DAMPED if damped else UNDAMPED))
-        tube = "region tube cylinder z 0 0 0.008 0.0025 0.05 units box"
-        side = "region side cylinder z 0 0 0.012 -0.001 0.06 units box side in"
-        walls = f"pair_coeff * * {model}\n{side}\nfix side all wall/gran/region granular {model} region side"
-        lmp = lammps_with(deck(
-            [], f"granular {wall}", "zplane 0 NULL contacts", box="block -0.03 0.03 -0.03 0.03 -0.001 0.06", load="",
-            fill=f"{tube}\ncreate_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000", units="si",
-            diameters=(0.004,), density="density 2500", timestep=1e-5,
-            more=f"{walls}\nfix load all gravity 9.81 vector 0 0 -1\nfix move all nve/sphere",
-            run="run 15000 post no\nunfix side\nrun 20000 post no",
-        ))  # fmt: skip
+        texts = {"model": model, "wall": wall, "seed": seed, "count": count}
+        lmp = lammps_with("\n".join(f'variable {name} string "{text}"' for name, text in texts.items()), "heap.in")
         faultgouge.relax(lmp)
         if not damped:
             lmp.command(f"pair_coeff * * {wall}")
@@ -54,8 +46,7 @@ HEAPS = {
 @pytest.mark.parametrize("which", HEAPS)
 def test_a_heap_after_pushes(heap, which):
     """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""
-    lmp = heap(*HEAPS[which])
-    here = faultgouge.from_lammps(lmp)
+    here = faultgouge.from_lammps(lmp := heap(*HEAPS[which]))
     is_proved(here, "laws", 1e-4)
     assert here.contacts.couple.sum() == len(here.contacts.touching)
     told, rolls = stability(here), which == "rolls at the bound"

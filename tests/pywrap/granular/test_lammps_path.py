@@ -7,46 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, instance, refused
+from granular_packings import DECKS, command, instance, refused
 
 import faultgouge
 from docs.run_page import files
 from faultgouge.analysis import BadInputError, NoEquilibriumError, find_onset, spectrum, stiffness_matrix
 
-LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
-
-
-def particles(places, law: str, wall: str, **changes) -> str:
-    """Commands of particles of two sizes."""
-    d, kinds = np.shape(places)[1], [1 + k % 2 for k in range(len(places))]
-    at = np.pad(places, [(0, 0), (0, 3 - d)])
-    density = "density/disc 1.0" if d == 2 else "density 1.0"
-    return deck(at, law, wall, dimension=d, kinds=kinds, diameters=(0.8, 1.0), density=density, load="", **changes)
-
-
-def slope(places, box: str, extra: str = "") -> str:
-    """Commands of particles of two sizes that come to rest on a floor."""
-    flat = np.shape(places)[1] == 2
-    plane, boundary, down, disc = ("y", "p f p", "-1 0", "disc") if flat else ("z", "p p f", "0 -1", "")
-    more = f"variable slope equal 0.0\nfix load all gravity 1.0 vector v_slope {down}\n{extra}"
-    more += f"\nfix move all nve/sphere {disc}\nfix drag all viscous 1.0"
-    told = {"box": f"block {box}", "boundary": boundary, "more": more, "run": "run 40000 post no"}
-    return particles(places, LAW, f"{plane}plane 0 NULL contacts", **told)
-
-
-def layer_of_disks() -> str:
-    """Disks, of which five are pushed."""
-    rng = np.random.default_rng(2)
-    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(20)]
-    pushed = "group top id 16:20\nvariable push internal 0.0\nfix pull top addforce v_push 0 0"
-    return slope(places, "0 5.25 0 40 -0.5 0.5", pushed) + "\nunfix drag"
-
 
 @pytest.fixture(scope="module")
 def layer(tmp_path_factory):
-    """The layer, which no test changes."""
+    """Disks on a slope, which no test changes."""
     lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
-    command(lmp, layer_of_disks())
+    lmp.file(str(DECKS / "layer.in"))
     yield lmp
     lmp.close()
 
@@ -72,10 +44,9 @@ def test_tilt_of_a_slope(layer):
     with lammps_path(layer, "slope", steps=2000) as path, pytest.raises(NoEquilibriumError, match=r"at 0\.1 in 2"):
         path(0.1)
     assert len(spectrum(found[0.1]).pairs) > 0
-    asked = []
-    onset = find_onset(lambda value: asked.append(value) or found[value], [0.0, 0.02], first=True)
+    # no other load is asked for: the packing is unstable as it stands
+    onset = find_onset({0.0: found[0.0]}.__getitem__, [0.0, 0.02], first=True)
     assert (onset.fx_c, len(onset.at_start.pairs)) == (0.0, len(spectrum(found[0.0]).pairs))
-    assert asked == [0.0]  # its packing is unstable as it stands, and no further load tells more
     assert np.array_equal(layer.numpy.extract_atom("x"), before)
 
 
@@ -85,7 +56,8 @@ def test_a_path_of_many_loads_keeps_few_copies(layer, monkeypatch, tmp_path):
     from faultgouge.pywrap import lammps_path
     from faultgouge.pywrap.granular import lammps_path as module
 
-    mark = (tmp_path / "mark").open("w")  # each copy inherits the open file; no process of another test has it
+    (tmp_path / "mark").touch()
+    mark = (tmp_path / "mark").open()  # each copy inherits the open file; no process of another test has it
 
     def holds(process: Path) -> bool:
         try:
@@ -120,9 +92,7 @@ def test_windows_of_spheres_are_those_of_all_eigenvalues(lammps_with):
         # imaginary parts at 1e-7 from an edge are some 1e-4 of the largest eigenvalue, those of rounding 1e-8
         return int(np.sum(values.imag > 1e-6 * np.abs(values).max()))
 
-    rng, corner = np.random.default_rng(3), 1.05 * np.array([(k % 2, k // 2 % 2, k // 4) for k in range(16)])
-    places = corner + np.column_stack([rng.uniform(0.4, 0.6, (16, 2)), np.full(16, 0.6)])
-    with lammps_path(lammps_with(slope(places, "0 2.1 0 2.1 0 40")), "slope") as path:
+    with lammps_path(lammps_with(deck="column.in"), "slope") as path:
         windows = find_onset(path, [0.0, 0.01, 0.02]).windows
         spans = [(each.fx_onset, np.inf if each.fx_end is None else each.fx_end) for each in windows]
         edges = [edge for span in spans for edge in span if 0 < edge < 0.02]
@@ -137,35 +107,30 @@ def test_where_drag_leaves_it(lammps_with):
     """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact."""
     from faultgouge.pywrap import lammps_path
 
-    lmp = lammps_with(layer_of_disks())
+    lmp = lammps_with(deck="layer.in")
     with lammps_path(lmp, "slope") as path:
         first, last = path(0.0), path(0.001)
     assert not last.contacts.at_bound.any()
     command(lmp, "variable slope equal 0.001\nfix drag all viscous 1.0\nrun 60000 post no")
     found = faultgouge.from_lammps(lmp)
-    way = np.abs(last.position - first.position).max()
     # both ways of the slips differ to second order, and the way is 3e-4 of a radius
-    assert np.abs(found.position - last.position).max() < 1e-5 * way
+    far, way = (np.abs(last.position - each.position).max() for each in (found, first))
+    assert far < 1e-5 * way
     one, other = (np.sort(np.linalg.norm(each.contacts.tangential_force, axis=1)) for each in (found, last))
     assert one == pytest.approx(other, abs=1e-7 * found.contacts.normal_force.mean())
 
 
-OF_A_USER = """import numpy as np
-def divides(lmp, value):
-    return 1 / 0
-def library(lmp, value):
-    np.linalg.inv(np.zeros((2, 2)))
-def ends(lmp, value):
-    raise SystemExit(3)
-def lammps(lmp, value):
-
-    lmp.command('fix pull nobody addforce 1 0 0')
+OF_A_USER = """import numpy as np, sys
+divides = lambda lmp, value: 1 / 0
+library = lambda lmp, value: np.linalg.inv(np.zeros((2, 2)))
+ends = lambda lmp, value: sys.exit(3)
+lammps = lambda lmp, value: lmp.command('fix pull nobody addforce 1 0 0')
 """
 FAILS = {
-    "divides": r"^At 0\.1: apply failed with ZeroDivisionError: division by zero \(load\.py, line 3\)\.$",
-    "library": r"^At 0\.1: apply failed with LinAlgError: Singular matrix \(load\.py, line 5\)\.$",
-    "ends": r"^At 0\.1: apply failed with SystemExit: 3 \(load\.py, line 7\)\.$",
-    "lammps": r"^At 0\.1: LAMMPS stopped: .*nobody.* \(load\.py, line 10\)\.$",
+    "divides": r"^At 0\.1: apply failed with ZeroDivisionError: division by zero \(load\.py, line 2\)\.$",
+    "library": r"^At 0\.1: apply failed with LinAlgError: Singular matrix \(load\.py, line 3\)\.$",
+    "ends": r"^At 0\.1: apply failed with SystemExit: 3 \(load\.py, line 4\)\.$",
+    "lammps": r"^At 0\.1: LAMMPS stopped: .*nobody.* \(load\.py, line 5\)\.$",
     "tilt": r"At 0\.1: LAMMPS stopped: .*tilt",  # the name of no variable
     "nothing": r"No force changes .* at 0\.1",
     "leaves": "ended without a word",
@@ -188,23 +153,14 @@ def test_force_on_a_layer_and_what_is_wrong_with_a_path(layer, tmp_path):
     with refused(r"The path is closed: ask it inside of its `with` block"):
         path(0.1)
     path.close()  # a second time does no harm
-    for balance in (np.nan, -1.0):
-        with pytest.raises(BadInputError, match="balance = "):
-            lammps_path(layer, "slope", balance=balance)
-
-
-STIFF = LAW.replace(" 0.5 1", " 2.0 1")
-"""No contact comes to rest at the bound."""
+    with pytest.raises(BadInputError, match="balance = "):
+        lammps_path(layer, "slope", balance=np.nan)
 
 
 @pytest.fixture
 def periodic(lammps_with):
     """Disks under pressure in a periodic box, at rest, with a log."""
-    corners = np.array([(k % 6 + k // 6 % 2 / 2, 0.1 + 0.9 * (k // 6)) for k in range(36)])
-    places = corners + np.random.default_rng(3).uniform(0, 0.1, (36, 2))
-    more = "fix move all nve/sphere disc\nfix drag all viscous 1.0\nchange_box all x final 0 5.35 y final 0 4.9 remap"
-    box = "block 0 6 0 5.5 -0.5 0.5"
-    return lammps_with(particles(places, STIFF, "", box=box, boundary="p p p", more=more, run="run 40000 post no"))
+    return lammps_with(deck="periodic.in")
 
 
 def stress(found) -> np.ndarray:
@@ -219,7 +175,7 @@ def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with,
     """Another granular instance was there in the process, and LAMMPS reads no history at all."""
     count = len(faultgouge.from_lammps(periodic).contacts)
     periodic.command(f"write_restart {tmp_path}/state")
-    law = f"pair_style gran/{STIFF}\npair_coeff * *\nfix move all nve/sphere disc"
+    law = "pair_style gran/hertz/history 1e5 3e4 40 20 2.0 1\npair_coeff * *\nfix move all nve/sphere disc"
     again = lammps_with(f"newton off\ncomm_modify vel yes\nread_restart {tmp_path}/state\n{law}", log="log.again")
     with refused(f"{count} of {count} contacts have no tangential force, as where histories"):
         faultgouge.from_lammps(again)
@@ -284,8 +240,7 @@ def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
 
     def stand_still(_, value):
         if value > 0:
-            copy.with_suffix(".new").write_text(str(os.getpid()))
-            copy.with_suffix(".new").rename(copy)
+            copy.write_text(str(os.getpid()))
             time.sleep(100)
 
     def wait(until) -> None:
@@ -300,7 +255,7 @@ def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
             lammps_path(layer, stand_still)(1.0)
         finally:
             os._exit(1)
-    wait(copy.exists)
+    wait(lambda: copy.exists() and copy.read_text())
     os.kill(program, signal.SIGKILL)
     os.waitpid(program, 0)
     wait(lambda: not Path(f"/proc/{copy.read_text()}").exists())

@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, is_proved, on_slope, refused
+from granular_packings import command, is_proved, on_slope, refused
 from table_rows import rows_of
 
 import faultgouge
@@ -69,12 +69,14 @@ def test_fixes_that_the_laws_of_contacts_do_not_have(spheres, fix, run, ends):
     assert "\n" not in str(refusal.value)
 
 
+RISES = "variable now equal step\nvariable rise equal 1+1e-6*(step-${now})\nfix load all gravity v_rise vector 0.1 0 -1"
+HIDDEN = f"echo none\npair_style {HERTZ.replace('NULL', '2e3')}\npair_coeff * *\necho both"
+
+
 @pytest.mark.parametrize(
     ("lines", "run", "says"),
-    [("variable now equal step\nvariable rise equal 1+1e-6*(step-${now})\nfix load all gravity v_rise vector 0.1 0 -1",
-      0, r"^LAMMPS's forces change with the time, though nothing moves: a load, "),
-     (f"echo none\npair_style {HERTZ.replace('NULL', '2e3')}\npair_coeff * *\necho both",
-      60000, r"as K says: .*some are not in the log")],
+    [(RISES, 0, "^LAMMPS's forces change with the time, though nothing moves: a load, "),
+     (HIDDEN, 60000, "as K says: .*some are not in the log")],
 )  # fmt: skip
 def test_a_load_that_follows_the_time_and_a_log_that_lacks_commands(spheres, lines, run, says):
     """A gravity that rises by a millionth a step is no force by positions."""
@@ -87,10 +89,10 @@ def test_a_force_of_places_is_in_the_operator(spheres):
     found, laws = (look(*spheres, "fix trap all addforce v_trap 0 0", 10000, prove=prove) for prove in (True, False))
     assert laws.operators == "laws"
     is_proved(found, "differences")
-    added = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray()
-    expected = np.diag(np.repeat([0.2, 0.0], [len(found), 5 * len(found)]))
+    added, n = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray(), len(found)
+    expected = np.diag(np.repeat([0.2, 0.0], [n, 5 * n]))
     assert added == pytest.approx(expected, abs=1e-5 * laws.contacts.normal_stiffness.max())
-    assert added.diagonal()[: len(found)] == pytest.approx(0.2, rel=0.05)
+    assert added.diagonal()[:n] == pytest.approx(0.2, rel=0.05)
 
 
 def test_proof_is_kept(sliding, tmp_path):
@@ -99,10 +101,8 @@ def test_proof_is_kept(sliding, tmp_path):
 
     told = [f"pair_style {STYLE}", *REST[:3]]
     found, other = faultgouge.from_lammps(sliding, told), faultgouge.from_lammps(sliding, prove=False)
-    assert found == other
-    assert found.contacts.at_bound.any()
-    assert found.proof < 1e-5
-    assert other.proof is None
+    assert (found == other, found.contacts.at_bound.any()) == (True, True)
+    assert (found.proof < 1e-5, other.proof) == (True, None)
     for each, says in ((found, f"proof {found.proof:.1g}>"), (other, "not proved>")):
         assert says in repr(each)
         write_configuration(tmp_path / "one.h5", each)
@@ -135,22 +135,9 @@ def test_commands_of_another_run(sliding, change, says):
     assert "addforce" not in str(refusal.value)
 
 
-def test_bonds(lammps_with):
+def test_bonds(taken):
     """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
-    more = "1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4"
-    bonded = """fix move all nve/sphere
-fix drag all viscous 1.5
-bond_style harmonic
-bond_coeff 1 50.0 0.99
-special_bonds lj/coul 1.0 1.0 1.0
-run 0
-create_bonds single/bond 1 1 2
-run 60000"""
-    places = [(0, 0, 0.5), (0.99, 0, 0.5), (0.5, 0.86, 0.5), (0.5, 0.29, 1.3)]
-    spheres = deck(places, HERTZ[5:], "zplane 0 NULL contacts", timestep=0.002, more=bonded)
-    spheres = spheres.replace("atom_style sphere", "atom_style hybrid sphere bond\natom_modify map array")
-    lmp = lammps_with(spheres.replace("create_box 1 box", f"create_box {more}"))
-    found = faultgouge.from_lammps(lmp)
+    lmp, found = taken("", "bonded.in")
     is_proved(found, "differences")
     lmp.command("delete_bonds all bond 1 remove")
     without = faultgouge.from_lammps(lmp, balance=np.inf, differences=True)

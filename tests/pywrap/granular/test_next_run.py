@@ -26,8 +26,8 @@ def sliding(log, count: int, slope: float, law: str, timestep: float, more: str)
 def state(lmp) -> np.ndarray:
     """All that moves, in the order of the IDs."""
     count = lmp.extract_setting("nlocal")
-    arrays = (lmp.numpy.extract_atom(name)[:count] for name in ("id", "x", "v", "omega", "f", "torque"))
-    rows = np.column_stack(list(arrays))
+    names = ("id", "x", "v", "omega", "f", "torque")
+    rows = np.column_stack([lmp.numpy.extract_atom(name)[:count] for name in names])
     return rows[np.argsort(rows[:, 0])]
 
 
@@ -46,10 +46,9 @@ def test_a_look_changes_nothing(tmp_path):
         ends.append(state(lmp))
         lmp.close()
     assert np.array_equal(*ends)
-    for name in ("dump", "mean"):
-        assert (tmp_path / f"{name}0").read_bytes() == (tmp_path / f"{name}2").read_bytes()
-    one, other = ((tmp_path / f"log{looks}").read_text().count("run ") for looks in (0, 2))
-    assert one == other
+    one, other = ([(tmp_path / f"{name}{looks}").read_text() for name in ("dump", "mean", "log")] for looks in (0, 2))
+    assert one[:2] == other[:2]
+    assert one[2].count("run ") == other[2].count("run ")
 
 
 @pytest.mark.parametrize(("style", "columns"), [("custom/gz", "id x y z vx vy vz fx fy fz"), ("xyz/gz", "")])

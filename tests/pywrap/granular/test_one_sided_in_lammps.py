@@ -60,8 +60,7 @@ def poured(tmp_path_factory):
     from research.lammps_laws.compute import pour, rest
 
     @cache
-    def make(law, seed=1, slope=None, dashpot=None):
-        slope, dashpot = (slope, dashpot) if slope else POURED[law]
+    def make(law, seed, slope, dashpot):
         lmp = pour(law, 3, 50, 0.5, seed, tmp_path_factory.mktemp("log") / "log.lammps", dashpot)
         lmp.command(f"variable slope equal {slope}")
         assert rest(lmp) is not None
@@ -114,7 +113,7 @@ def test_what_is_said_to_rest_is_at_rest_in_lammps(small, law):
 def test_what_grows_out_of_rounding_noise_is_never_called_stable(poured, law):
     """LAMMPS after a push of 1e-9, since D grows in three of the four; without any push, for 30 units of time; and with
     those of the verdict."""
-    lmp, here = poured(law)
+    lmp, here = poured(law, 1, *POURED[law])
     compare(lmp, here, np.arange(1.0, 10.0, 2.0), 5e-4, size=1e-9)
     told, push = stability(here), random_pushes(here, PUSHES)
     noise = pushed(lmp, here, 0 * push[:, :1], [1.0, 30.0], 5e-4)[:, 0] * PUSH**2

@@ -55,8 +55,7 @@ def test_the_standard_law_after_a_push(layer):
     """Dashpots of the plugin feel the velocity of the full step, and those of one-sided motion that of the half step:
     1 % of D."""
     here = layer.configuration
-    assert here.contacts.one_sided.any()
-    assert len(layer.contacts) - here.contacts.one_sided.sum() > 100
+    assert 0 < here.contacts.one_sided.sum() < len(layer.contacts) - 100
     push = random_pushes(here, 1)
     push.reshape(here.axes, len(here), -1)[:, layer.rattlers] = 0.0  # the runs of this package hold rattlers
     for column in push.T:
@@ -70,7 +69,7 @@ def far_from_the_bound():
     from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 
     parts = {"packing": {"disks": 30, "seed": 4, "top": 3, "width": 3.57}, "load": {"fy": 3.0}}
-    parts["law"] = {"kn": 2e5, "mu": 2.0, "history": "coulomb"}
+    parts |= {"law": {"kn": 2e5, "mu": 2.0, "history": "coulomb"}}
 
     @cache
     def make(cn):

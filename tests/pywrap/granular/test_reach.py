@@ -87,20 +87,18 @@ def test_the_push_that_the_bound_is_made_for_takes_a_contact_there(bed, law, d):
     system = OneSidedSystem.of(here)
     reach, stiffness = reach_of(system), system.motion.stiffness
     symmetric = 0.5 * (stiffness + stiffness.T).toarray()
-    changes, best = system.changes, np.inf
-    count = len(changes.bound)
+    changes, none, best = system.changes, np.zeros((0, 1)), np.inf
     rows, viscous = (csr_array(each).toarray() for each in (changes.rows, changes.viscous))
-    none = np.zeros((0, 1))
-    for k in range(count):
-        opens, slope = rows[2 * count + k], changes.bound_slope[k]
+    count = len(changes.bound)
+    for k, opens in enumerate(rows[2 * count : 3 * count]):
         for s in (1.0, -1.0):
-            row, dashpots = s * rows[k] - slope * opens, s * viscous[k] - viscous[2 * count + k]
+            row = s * rows[k] - changes.bound_slope[k] * opens
+            dashpots = s * viscous[k] - viscous[2 * count + k]
             z = np.linalg.solve(symmetric, row)
             first = changes.first(z[:, None], dashpots[:, None], none, none)[0]
-            best = min(best, 0.5 * (z @ symmetric @ z + dashpots @ dashpots) * first**2)
-        best = min(
-            best, 0.5 * (OVERLAP_CHANGE * changes.overlap[k, 0]) ** 2 / (opens @ np.linalg.solve(symmetric, opens))
-        )
+            best = min(best, 0.5 * (z @ row + dashpots @ dashpots) * first**2)
+        lift = OVERLAP_CHANGE * changes.overlap[k, 0]
+        best = min(best, 0.5 * lift**2 / (opens @ np.linalg.solve(symmetric, opens)))
     assert 0.7 * best < reach.energy * reach.gain < best * (1 + 1e-9)  # a contact may be nearest the bound sideways
 
 

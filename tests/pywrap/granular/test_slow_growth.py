@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, deck, of_particle
+from granular_packings import command, of_particle
 
 import faultgouge
 from faultgouge.analysis import spectrum, stability
@@ -10,7 +10,6 @@ from faultgouge.analysis.motion import linear
 
 SPRING, HALF_SPAN = 1e3, 0.95
 MASS = np.pi / 6
-LINEAR = "hooke 500 1 tangential linear_history 200 1.0 0.5 damping velocity"
 
 
 @pytest.mark.parametrize(
@@ -26,14 +25,9 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
     stiffness = 2 * SPRING * (1 / length**3 * height**2 + 1 - 1 / length)  # -d F_y / dy
     damping = 2 * dashpot * (height / length) ** 2
     expected = max(np.roots([MASS, damping, stiffness]).real)
-    arch = deck(
-        [(-HALF_SPAN, 0, 0), (HALF_SPAN, 0, 0), (0, height, 0)],
-        f"granular hooke {SPRING} {dashpot} tangential linear_history 300 1.0 0.0 damping velocity",
-        box="block -4 4 -4 4 -0.5 0.5", boundary="f f p", dimension=2, kinds=(1, 1, 2), diameters=(1.0, 1.0), load="",
-        more=f"group middle type 2\nfix move middle nve/sphere\nfix load middle gravity "
-        f"{2 * force * height / length / MASS:.17g} vector 0 -1 0", timestep=0.2 * MASS / damping,
-    )  # fmt: skip
-    lmp = lammps_with(arch)
+    load = 2 * force * height / length / MASS
+    told = {"height": height, "dashpot": dashpot, "load": load, "step": 0.2 * MASS / damping}
+    lmp = lammps_with("\n".join(f"variable {name} string {value:.17g}" for name, value in told.items()), "arch.in")
     if large:  # as if not all eigenvalues were known
         monkeypatch.setattr(linear, "LAPACK_FIRST", 0)
     verdict = stability(faultgouge.from_lammps(lmp))
@@ -44,43 +38,27 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
     assert of_particle(lmp, "v", 3)[1] == pytest.approx(displacement * expected, rel=1e-3)
 
 
-def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
+def test_a_small_sphere_that_rolls_hides_no_growth_of_others(taken):
     """A sphere on top of another one rolls down. Beside them a sphere of a tenth of their size feels a force that is
     left, 0.9e-4 of the mean contact force, which would be an eigenvalue of 1 of its own."""
-    rolls = "group small type 3\ngroup moving type 2 3\nfix rolls small addforce 2.3e-5 0 0\nfix move moving nve/sphere"
-    stack = deck(
-        [(0, 0, 0.5), (0, 0, 1.5 - MASS / 500), (2, 0, 0.05 - 1e-3 * MASS / 500)], f"granular {LINEAR}",
-        "zplane 0 NULL contacts", kinds=(1, 2, 3), diameters=(1.0, 1.0, 0.1), load="", timestep=5e-4,
-        more=f"{rolls}\nfix load moving gravity 1.0 vector 0 0 -1",
-    )  # fmt: skip
-    lmp = lammps_with(stack)
-    here = faultgouge.from_lammps(lmp)
+    lmp, here = taken("", "rolls.in")
     verdict = stability(here)
     assert (verdict.stable, len(spectrum(here).negative)) == (False, 2)
     of_particle(lmp, "v", 2)[0] = 1e-7
-    places = []
-    for _ in range(2):
-        lmp.command("run 8000 post no")
-        places.append(of_particle(lmp, "x", 2)[0])
-    assert 2 * np.log(places[1] / places[0]) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
+    lmp.command("run 8000 post no")
+    before = float(of_particle(lmp, "x", 2)[0])
+    lmp.command("run 8000 post no")
+    assert 2 * np.log(of_particle(lmp, "x", 2)[0] / before) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
 
 
-BOUNCES = "hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL"
-
-
-def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
+def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(taken):
     """Its Re s is zero but for rounding, of either sign."""
-    walls = f"group bounces type 1\ngroup lossy type 2\nfix spring bounces wall/gran granular {BOUNCES}\n"
-    walls += f"fix dashpot lossy wall/gran granular {LINEAR} zplane 0 NULL\nfix move all nve/sphere"
-    places = [(0, 0, 0.5 - MASS / 500), (2, 0, 0.5 - MASS / 500)]
-    lmp = lammps_with(deck(places, f"granular {LINEAR}", kinds=(1, 2), diameters=(1.0, 1.0), more=walls))
-    here = faultgouge.from_lammps(lmp)
+    lmp, here = taken("", "bounces.in")
     verdict = stability(here)
     assert (verdict.stable, verdict.growth_rate) == (True, 0)
     assert str(verdict).startswith("stable: no motion grows, except for ")
     assert "no motion grows (`stability` says more)" in repr(spectrum(here))
-    lmp.command("velocity all set 1e-5 0 1e-5")
-    lmp.command("run 20000 post no")  # a hundred oscillations
+    command(lmp, "velocity all set 1e-5 0 1e-5\nrun 20000 post no")  # a hundred oscillations
     speeds = []
     for _ in range(200):
         lmp.command("run 2 post no")
