@@ -18,12 +18,12 @@ DRAWN = {"time": 0.15, "velocity": 60.0, "spring": 500.0, "states": 0.04, "every
 SHORT = {
     "settle": {},
     "ramp": {"until": 1e-3},
-    "perturb": {"time": 0.2},
-    "perturb, damped": {"fx": 0.01, "time": 0.5, "amplitude": 1e-6, "v_ss": 2e-9, "cn": 2.0, "ct": 1.0, "tau": 20.0},
+    "perturb": {"time": 0.1},
+    "perturb, damped": {"fx": 0.01, "time": 0.2, "amplitude": 1e-6, "v_ss": 2e-9, "cn": 2.0, "ct": 1.0, "tau": 20.0},
     "perturb, signal": {"time": 0.2, "signal": "record.txt", "scale": 1e-6, "on": "floor"},
     "drive": DRAWN,
     "drive, protocol": {**DRAWN, "protocol": "60 0.1 0 0.02 -60 0.03"},
-    "drive, rigid": {**DRAWN, "velocity": 5.0, "spring": "rigid"},
+    "drive, rigid": {**DRAWN, "velocity": 5.0, "spring": "rigid", "time": 0.05},
     "drive, signal": {**DRAWN, "signal": "record.txt", "scale": 1.0},
 }
 
