@@ -34,7 +34,7 @@ class RunFileParser(TopologyReaderBase):
     format = FORMAT
 
     def parse(self, **_: Any) -> Topology:
-        """The disks of the file, which is checked whole; a PackingFileError if it is damaged, or no run of faultgouge."""
+        """The disks of the file, which is checked whole; a PackingFileError if it is damaged, or no run of ours."""
         with RunFile(self.filename) as file:
             packing = file.packing(0)
         count = len(packing)
