@@ -34,10 +34,7 @@ class RunFileParser(TopologyReaderBase):
     format = FORMAT
 
     def parse(self, **_: Any) -> Topology:
-        """The disks of the file, which is checked whole.
-
-        Raises PackingFileError if the file is damaged, or not a run of faultgouge.
-        """
+        """The disks of the file, which is checked whole; a PackingFileError if it is damaged, or no run of ours."""
         with RunFile(self.filename) as file:
             packing = file.packing(0)
         count = len(packing)
@@ -48,13 +45,8 @@ class RunFileParser(TopologyReaderBase):
 
 
 class RunFileReader(H5MDReader):
-    """The frames of a run.h5, for ``MDAnalysis.Universe``; a file has no units.
-
-    Parameters
-    ----------
-    convert_units : bool
-        As of MDAnalysis's reader of H5MD, but False by default.
-    """
+    """The frames of a run.h5, for ``MDAnalysis.Universe``; a file has no units, so that `convert_units`, as of
+    MDAnalysis's reader of H5MD, is False by default."""
 
     format = FORMAT
 

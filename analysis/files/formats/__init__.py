@@ -92,9 +92,9 @@ def format_of(path: Path) -> Format:
     if found is None and begins_with(path, RESTART_BEGINNING):
         return RESTART
     if found is None:
-        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data, or a LAMMPS deck (.in)"
-        needs = "run.h5 needs no import: packing.file, draw and spectrum take it"
-        raise PackingFileError(f"{path} is of no format that is read: give {names}; a {needs}.")
+        names = f"{', '.join(READERS)}, data.NAME, dump.NAME, YADE's text, MercuryDPM's data"
+        needs = "LAMMPS decks (.in, in.NAME); a run.h5 needs no import: packing.file, draw and spectrum take it"
+        raise PackingFileError(f"{path} is of no format that is read: give {names}, {needs}.")
     return found
 
 

@@ -8,9 +8,8 @@ Disks of type 2 form the upper layer. The slip on the floor is in the dump of di
 one disk. LAMMPS also lists pairs that do not overlap, up to its cutoff; these are not contacts. Without friction there
 are neither slips nor angles, and their columns may be missing. Low parts are there in compensated arithmetic alone.
 
-Law, load and inertia are not part of a dump. They are given by the caller or by a file of the same name with the suffix
-".params", which has one ``key value`` per line from kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy,
-inertia_factor. A law from the caller takes precedence.
+Law, load and inertia are in a file of the same name with the suffix ".params", which has one ``key value`` a line, of
+kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau, fx, fy, inertia_factor. A law from the caller takes precedence.
 
 Of a dump custom, columns are x or xu, radius or diameter, and, if present, id, type, mass, theta.
 """
@@ -59,11 +58,8 @@ class DumpFrame(NamedTuple):
 
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
-    """The snapshots of a LAMMPS text dump, one after the other.
-
-    Raises PackingFileError if the file is missing, or breaks off or is malformed before the snapshot asked for is
-    complete.
-    """
+    """The snapshots of a LAMMPS text dump, one after the other; a PackingFileError if the file is missing, breaks off,
+    or is malformed before the snapshot asked for is complete."""
     unread, broken = telling(path, "cannot be read", OSError), telling(path, "is not a complete LAMMPS text dump")
     with unread, open_text(path) as file, broken:
         while (frame := _next_frame(file)) is not None:

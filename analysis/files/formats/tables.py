@@ -3,11 +3,8 @@
 **CSV**: a line of names, and a line a disk (x, y, radius; also id, mass, angle, top, type) or a contact. A packing has
 no units of its own, and nothing is converted: names with a unit are refused.
 
-**YADE**, from yade.export.textExt: a line with the names of the columns, joined by underscores, and one line for each
-sphere. YADE's own export has six digits, so that overlaps are rounded.
-
-    #format x_y_z_r_matId
-    1.25    0.5    0    0.5    1
+**YADE**, from yade.export.textExt: a line with the names of the columns, as in ``#format x_y_z_r_matId``, and one line
+for each sphere. YADE's own export has six digits, so that overlaps are rounded.
 
 **MercuryDPM**, data files: for each time a line "N time bounds", and one line for each particle. In two dimensions
 there are four bounds, and a line is x y vx vy radius angle spin info. In three dimensions there are six bounds, and a
