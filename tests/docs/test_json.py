@@ -18,15 +18,11 @@ def named(command):
 
 @pytest.mark.slow
 def test_keys_of_commands(faultgouge_here, tmp_path):
-    scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}})
-    (tmp_path / "scene.toml").write_text(scene)
-    ramp = json.loads(faultgouge_here("ramp", "scene.toml", "--json").stdout)
-    spectrum = json.loads(faultgouge_here("spectrum", "run.h5", "--json").stdout)
-    onset = json.loads(faultgouge_here("onset", "scene.toml", "--all", "--json").stdout)
+    (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}}))
+    asked = ("ramp", "scene.toml"), ("spectrum", "run.h5"), ("onset", "scene.toml", "--all")
+    ramp, spectrum, onset = (json.loads(faultgouge_here(*words, "--json").stdout) for words in asked)
     assert {each.pop("faultgouge_format") for each in (ramp, spectrum, onset)} == {1}
-    assert len(ramp["equilibria"]) == 5
-    assert len(onset["windows"]) >= 1
     assert {*ramp, *ramp["equilibria"][0]} <= named("ramp")
     inner = [spectrum["stability"], spectrum["stability"]["undamped"], *spectrum["pairs"]]
-    assert {key for each in (spectrum, *inner) for key in each} - named("spectrum") == set()
-    assert {key for each in (onset, *onset["windows"]) for key in each} - named("onset") == set()
+    assert {key for each in (spectrum, *inner) for key in each} <= named("spectrum")
+    assert {*onset, *onset["windows"][0]} <= named("onset")
