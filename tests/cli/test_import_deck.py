@@ -219,7 +219,7 @@ REFUSED = [
     ("pile.in --balance nan", DISKS, 2, "greater than or equal to 0"),
     ("a.csv --balance 1", "", 2, "--balance is for a LAMMPS deck"),
     ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),
-    ("pile.lammps", DISKS, 2, "a LAMMPS deck (.in)"),
+    ("pile.lammps", DISKS, 2, "LAMMPS deck"),
     ("lig.in", "atom_style granular\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", "units si\nhard_particles yes\n", 1, "this is a deck of LIGGGHTS, whose"),
     ("lig.in", f"{LIGGGHTS}fix m1 all property/global youngsModulus peratomtype 5.e6\n", 1, "of LIGGGHTS, whose"),
