@@ -134,7 +134,7 @@ def test_pyvista_reads_disks_contacts_and_modes_and_steps_through_a_pvd(tmp_path
     force, pair = mesh["contact_force"][n:, :2], ~sheared.contacts.floor
     np.add.at(total, sheared.contacts.i, force)
     np.subtract.at(total, sheared.contacts.j[pair], force[pair])
-    np.testing.assert_allclose(total, mesh["net_force"][:n, :2], atol=1e-12)
+    np.testing.assert_allclose(total, mesh["net_force"][:n, :2], rtol=0, atol=1e-12)
     path, places = motion
     reader = pyvista.get_reader(film(path, ".pvd"))
     assert list(reader.time_values) == [0.0, 0.5, 1.0, 1.5]
@@ -150,7 +150,7 @@ def test_pyvista_reads_disks_contacts_and_modes_and_steps_through_a_pvd(tmp_path
 
 def assert_same_places(found, place, box_length, atol):
     """The same in the plane, whatever the image in the periodic box."""
-    np.testing.assert_allclose(nearest_image(np.array(found)[:, :2] - place, box_length), 0, atol=atol)
+    np.testing.assert_allclose(nearest_image(np.array(found)[:, :2] - place, box_length), 0, rtol=0, atol=atol)
 
 
 @FILMS
@@ -181,7 +181,7 @@ def test_mdanalysis_and_gsd_read_it(tmp_path, sheared, suffix, mdanalysis):
         turned = 2 * np.arctan2(particles.orientation[:, 3], particles.orientation[:, 0])
         assert frame.configuration.dimensions == 2
         np.testing.assert_array_equal(particles.diameter, np.float32(2 * sheared.radius))
-        np.testing.assert_allclose(np.sin(turned - sheared.angle), 0, atol=1e-6)  # float32
+        np.testing.assert_allclose(np.sin(turned - sheared.angle), 0, rtol=0, atol=1e-6)  # float32
         np.testing.assert_array_equal(frame.log["particles/net_force"][:, :2], sheared.net_force.reshape(3, -1)[:2].T)
 
 
@@ -194,7 +194,7 @@ def test_lines_of_a_vtp_go_from_disk_to_disk_and_to_the_floor(tmp_path, sheared)
     np.testing.assert_array_equal(first, sheared.position[contacts.i])
     foot = first * (1.0, 0.0)
     expected = np.where(contacts.floor[:, None], foot, sheared.position[contacts.j])
-    np.testing.assert_allclose(nearest_image(second - expected, sheared.box_length), 0, atol=1e-14)
+    np.testing.assert_allclose(nearest_image(second - expected, sheared.box_length), 0, rtol=0, atol=1e-14)
 
 
 @pytest.fixture(scope="module", params=["double", pytest.param("compensated", marks=pytest.mark.long)])
@@ -289,7 +289,7 @@ def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):
         np.add.at(total, table.id1 - 1, force)
         pair = table.id2 > 0
         np.subtract.at(total, table.id2[pair] - 1, force[pair])
-        np.testing.assert_allclose(total, held.net_force[:, 0], atol=1e-12)
+        np.testing.assert_allclose(total, held.net_force[:, 0], rtol=0, atol=1e-12)
         np.testing.assert_allclose(table.f_t, held.mobilised * held.contacts.friction, rtol=1e-12)
     assert np.array_equal(read_slips(tmp_path / "contacts.csv").slip, sheared.contacts.slip)
 

@@ -140,7 +140,7 @@ def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_p
     for says, layer in (("group:upper", sheared.top), ("type:2", sheared.top), ("group:odd", disks.id % 2 == 1)):
         np.testing.assert_array_equal(upper_layer(disks, says), layer)
     moved = nearest_image(disks.position - sheared.position, sheared.box_length)  # LAMMPS takes images into the box
-    np.testing.assert_allclose(moved, 0, atol=1e-14)
+    np.testing.assert_allclose(moved, 0, rtol=0, atol=1e-14)
     np.testing.assert_array_equal(disks.radius, sheared.radius)
     np.testing.assert_allclose(disks.mass, sheared.mass, rtol=2.3e-16)  # a last bit: density times volume is rounded
     assert disks.box_length == sheared.box_length
@@ -168,7 +168,7 @@ def test_disks_out_of_balance_come_to_rest(tmp_path, faultgouge, faultgouge_here
     assert rest == load(tmp_path / "two.h5")
     assert (rest.fx, rest.residual < 1e-9) == (packing.fx, True)
     if slips:  # friction keeps the slips to within what the disks have moved
-        np.testing.assert_allclose(rest.contacts.slip, c.slip, atol=1e-6)
+        np.testing.assert_allclose(rest.contacts.slip, c.slip, rtol=0, atol=1e-6)
         return
     assert not rest.contacts.slip.any()
     # the packing is the one that was rounded: the reference is an equilibrium of the same law

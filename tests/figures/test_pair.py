@@ -18,7 +18,7 @@ def test_the_pair_over_the_load_has_both_members_which_meet_at_the_onset():
             for drawn in (line, dots):
                 at, value = drawn.get_xydata()[np.isfinite(drawn.get_ydata())].T
                 wanted = np.sort([part(1 + s * np.sqrt(fx_c - at + 0j)) for s in (-1, 1)], axis=0)[(sign + 1) // 2]
-                np.testing.assert_allclose(value, wanted, atol=1e-8)  # the root of what rounding leaves of D
+                np.testing.assert_allclose(value, wanted, rtol=0, atol=1e-8)  # the root of what rounding leaves of D
             np.testing.assert_array_equal(dots.get_xdata(), fx)
             assert np.abs(line.get_xdata() - fx_c).min() < 1e-12
 
@@ -34,7 +34,7 @@ def test_nothing_is_drawn_between_two_loads_of_which_one_is_unknown_and_a_fallin
     assert not np.any((fine.fx > 1) & (fine.fx < 3))
     assert np.isnan(fine.fx).sum() == 1
     np.testing.assert_array_equal(np.isnan(fine.real), np.isnan(fine.imaginary))
-    np.testing.assert_allclose(np.diff(fine.eigenvalues[np.isfinite(fine.fx)], axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(fine.eigenvalues[np.isfinite(fine.fx)], axis=1), 1.0, rtol=0, atol=1e-12)
     assert len(curve_through(fx, np.full((5, 2), np.nan + 0j))[0]) == 0
     root = np.sqrt(1.7 - fx + 0.05 * fx**2 + 0j)
     pair = np.column_stack([2 - root, 2 + root])

@@ -28,7 +28,7 @@ def test_the_brightest_dot_faces_the_lamp():
     row, column = np.unravel_index(np.argmax(dots[..., 0]), dots.shape[:2])
     size = 2 / DOTS_ACROSS
     seen = np.array([-1 + size * (column + 0.5), 1 - size * (row + 0.5)]) / radius
-    np.testing.assert_allclose(seen, flat(LIGHT), atol=0.05)  # next to its top a cosine is flat
+    np.testing.assert_allclose(seen, flat(LIGHT), rtol=0, atol=0.05)  # next to its top a cosine is flat
 
 
 def test_bars_are_as_wide_as_their_forces_and_end_on_the_floor(column):

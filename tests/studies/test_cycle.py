@@ -125,7 +125,6 @@ def test_motions_of_many_lone_disks_do_not_hide_a_motion_of_two():
     assert beside["damped_sticking"] == pytest.approx(alone["damped_sticking"], rel=1e-6)
 
 
-@pytest.mark.long
 def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgouge_here, monkeypatch):
     slip = Slip(begins=15.0, ends=30.0, force_before=1.0, force_after=0.5, slip=1e-3, kinetic_energy=1e-6)
     monkeypatch.setattr("faultgouge.studies.cycle.slips_in", lambda file: ([slip], None))

@@ -166,7 +166,10 @@ def read_json(path: Path) -> Disks:
     if data.get("mass") is not None:
         columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), len(x))
     with telling(path, "has a wrong top, which holds indices of disks from 0, or true and false", IndexError):
-        top[data.get("top") or []] = 1.0
+        given = data.get("top") or []
+        if min(given, default=0) < 0:
+            raise IndexError(f"{min(given)} is none")
+        top[given] = 1.0
     if top.any():
         columns["top"] = top
     box, none = np.diag([float(data.get("box_length") or 0.0), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
