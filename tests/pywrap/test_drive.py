@@ -86,14 +86,21 @@ def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
 
 @pytest.mark.ranks
 @pytest.mark.slow
-@pytest.mark.parametrize(("ranks", "precision"), [(1, "double"), (2, "double"), (1, "compensated")])
-def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, ranks, precision):
-    run_to_end(scene(precision, **THROWN), tmp_path / "drive.h5")
+@pytest.mark.parametrize(
+    ("ranks", "precision", "diameter"), [(1, "double", None), (2, "double", 1.0), (1, "compensated", None)]
+)
+def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, ranks, precision, diameter):
+    """Of the decks' own packing, too, whose disk 1 is not the smallest, if the deck has the smallest diameter."""
+    wanted, given = scene(precision, **THROWN), {"spring": 300.0, "velocity": 40.0, "time": 0.2, "states": 0.02}
+    if diameter is not None:
+        shipped = wanted.packing.model_copy(update={"file": DECKS / "packing100.data", "top": "type:2"})
+        wanted, given["diameter"] = wanted.model_copy(update={"packing": shipped}), diameter
+    run_to_end(wanted, tmp_path / "drive.h5")
     with RunFile(tmp_path / "drive.h5") as file:
         (tmp_path / "start.data").write_text(data_file(file.packing(0)))
         stored, last = file.packing(-1), file.series("drive")
-    given = {"spring": 300.0, "velocity": 40.0, "time": 0.2, "states": 0.02, "every": 1}
-    lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, data=tmp_path / "start.data", precision=precision, **given)
+    data = tmp_path / "start.data"
+    lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, data=data, precision=precision, every=1, **given)
     dumped, row = read_dump(tmp_path / "drive.end.disks"), np.loadtxt(tmp_path / "drive.series")[-1]
     assert dumped.fx == stored.fx
     for name in ("position", "position_low", "angle"):
