@@ -79,7 +79,7 @@ SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -
 def test_walls_that_hand_out_no_contacts(taken, walls):
     """The word `contacts` changes no motion, and the contacts are found without it, in a corner of two walls, too."""
     deck, shape = (DECK, ROUND) if walls == 1 else (DECK.replace("fix move", SIDE), ROUND | {"down": "-0.3 0 -1"})
-    told, without = (taken(deck.format(**shape, word=word))[1] for word in ("contacts", ""))
+    told, without = (taken(deck.format(**shape, word=word), name=f"pile{word}")[1] for word in ("contacts", ""))
     one, other = told.contacts, without.contacts
     assert without.operators == "laws"
     assert np.array_equal(one.i, other.i)

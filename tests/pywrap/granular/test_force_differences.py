@@ -140,7 +140,7 @@ def test_particles_far_apart_that_something_couples(lammps_with):
         faultgouge.from_lammps(lmp, differences=True, balance=np.inf)
 
 
-@pytest.fixture(scope="module", params=[24, pytest.param(126, marks=pytest.mark.long)])
+@pytest.fixture(scope="module", params=[36, pytest.param(126, marks=pytest.mark.long)])
 def cone(request, tmp_path_factory):
     """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     lmp = instance(tmp_path_factory.mktemp("cone") / "log.lammps")
