@@ -201,18 +201,7 @@ IN_A_LIBRARY = """subprocess.Popen(["sh", "-c", f"sleep 1; kill {os.getppid()}"]
         ("os._exit(0)", 1, "a library has ended the command; please report it"),
         ("sys.exit(3)", 3, ""),
     ],
-    ids=[
-        "class",
-        "hangup",
-        "library",
-        "CPU time",
-        "SIGTERM",
-        "SIGKILL",
-        "SIGSEGV",
-        "abort",
-        "exit of a library",
-        "exit",
-    ],
+    ids=["class", "hangup", "library", "CPU time", "SIGTERM", "SIGKILL", "SIGSEGV", "abort", "exit of C", "exit"],
 )
 def test_how_the_work_has_ended_is_said_in_one_sentence(tmp_path, does, code, says):
     script = does if does == IN_A_CLASS else GUARDED.format(does)
