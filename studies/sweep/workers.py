@@ -67,6 +67,7 @@ def open_executor(workers: int | None, executor: Executor | None = None) -> Iter
         pool = ProcessPoolExecutor(number, get_context("spawn"), initializer=_begin, initargs=(os.getpid(),))
         try:
             yield pool
+            pool.shutdown()  # or Python, at its own end, may write to a pipe that is closed by then
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
