@@ -45,7 +45,7 @@ def installed(tmp_path_factory, environment):
 def test_an_extra_does_not_compile_the_plugin_again(installed):
     fresh, (first, second) = installed
     compiled = [text.count("Building CXX object") for text in (first, second)]
-    assert compiled[0] > 10
+    assert compiled[0] > 3
     assert compiled[1] == 0
     subprocess.run([fresh / "bin" / "python", "-I", "-c", "import gsd, imageio_ffmpeg"], check=True)
 
