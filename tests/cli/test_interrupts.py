@@ -120,7 +120,8 @@ def test_what_is_kept_is_said(tmp_path, command, says):
     assert not any(line.startswith("Error") for line in ahead)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_import_leaves_nothing(tmp_path, monkeypatch, number):
     """LAMMPS runs for hours without an instruction of Python, and is ended in the midst of its run."""
     temporary = tmp_path / "temporary"

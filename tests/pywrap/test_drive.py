@@ -180,8 +180,8 @@ def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says
         check_drive(wanted, settle_for_drive(wanted) if "damping" in change else settled)
 
 
+@pytest.mark.long
 @pytest.mark.ranks
-@pytest.mark.slow
 def test_command_on_two_ranks_is_the_same_to_the_bit(scene, faultgouge, faultgouge_here, tmp_path):
     drive = {"spring": 10.0, "velocity": 5e-3, "until": 0.3, "states": 0.1}
     wanted = BASE | {"packing": {"file": str(scene(**THROWN).packing.file)}, "damping": {"cn": 60.0}, "drive": drive}

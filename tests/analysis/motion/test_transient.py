@@ -44,7 +44,8 @@ def test_no_sampled_propagator_is_larger(cluster, norm, dissipation):
         assert q @ k @ q + np.sum(mass * v * v) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("fx", [0.0205, pytest.param(0.0218, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("fx", [0.0205, 0.0218])
 def test_the_gain_is_the_largest_singular_value(path, fx):
     """Of the propagator of a real packing at its time, and at others around; the start is one that reaches it. The
     onset is at 0.0218331."""

@@ -28,8 +28,8 @@ def path(ramp):
     return ramp(1.0, 1e-3, 26)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [*(pytest.param(each, marks=pytest.mark.long) for each in ("weak", "medium")), "drag"])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_window_is_that_among_all_modes_on_one_rank_and_on_two(path, kind):
     """From a little before it on."""
     damped, loads = with_dissipation(path, **KINDS[kind]), path.grid[21:]
