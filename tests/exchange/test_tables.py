@@ -55,7 +55,7 @@ def test_slips_that_fit_no_contact_are_refused(read, tmp_path, table, says):
 
 
 XYZ = """4
-Lattice="9 0 0 0 9 0 0 0 1" Properties=species:S:1:pos:R:3:radius:R:1
+Lattice="9 0 0 0 9 0 0 0 1" Properties=species:S:1:pos:R:3:radius:R:1 mu=high
 Fe 1 0.5 0 0.5
 Fe 2 0.5 0 0.5
 Al 1.5 1.36 0 0.5

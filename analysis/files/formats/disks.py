@@ -303,6 +303,8 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
     elif kind == "ids" and value:
         for part in re.split(r"[\s,]+", (read_plain_text(value[1:]) if value.startswith("@") else value).strip()):
             first, _, last = part.partition("-")
+            if not re.fullmatch(r"\d+(-\d+)?", part):
+                raise ValueError(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
             within = (int(first) <= disks.id) & (disks.id <= int(last or first))
             if within.sum() <= int(last or first) - int(first):
                 raise ValueError(f"{disks.source} has no disk {part}")

@@ -154,7 +154,10 @@ def read_back(
     """Fields `given` and `slips` of Disks, of what a file, which may be another's, has by name, and of `Exported.rows`
     in it, if there are any; `low` tells whether these have low parts of slips."""
     check_format(values.get(FORMAT_KEY), path)
-    given = {key: float(values[key]) for key in PARAMETER_NAMES & values.keys()}
+    given = dict[str, float]()
+    for key in PARAMETER_NAMES & values.keys():
+        with suppress(TypeError, ValueError):  # another program's, by the same name
+            given[key] = float(values[key])
     if rows is None:
         return {"given": given}
     columns = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 4 if low else 3)).T
